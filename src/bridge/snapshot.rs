@@ -1,0 +1,123 @@
+//! What the window shows: the state of the daemon at one moment.
+//!
+//! Angles in degrees, distances in metres, ages in milliseconds; what is not known is `None`, never NaN.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+/// The content of `/api/v1/status`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Snapshot {
+    pub version: String,
+    pub uptime_s: f64,
+    /// `None` until it is settled.
+    pub system_id: Option<u8>,
+    pub links: Vec<LinkSnapshot>,
+    pub vehicle: VehicleSnapshot,
+    pub gimbals: Vec<GimbalSnapshot>,
+    pub conflicts: Vec<String>,
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LinkSnapshot {
+    pub name: String,
+    pub role: String,
+    pub endpoint: String,
+    /// `up` or `down`.
+    pub state: String,
+    /// Why it is down.
+    pub reason: Option<String>,
+    pub rx_frames: u64,
+    pub tx_frames: u64,
+    pub rx_bytes: u64,
+    pub tx_bytes: u64,
+    pub crc_errors: u64,
+    pub resync_bytes: u64,
+    pub dropped_frames: u64,
+    /// Why frames towards this link were dropped, or frames from it not delivered.
+    pub dropped: BTreeMap<String, u64>,
+    pub peers: Vec<PeerSnapshot>,
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PeerSnapshot {
+    pub address: String,
+    /// Who was heard there, as `system/component`.
+    pub components: Vec<String>,
+    /// Since anything was heard; `None` before that.
+    pub age_ms: Option<u64>,
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct VehicleSnapshot {
+    pub system_id: Option<u8>,
+    /// `ardupilot`, `px4`, or the number of another `MAV_AUTOPILOT`.
+    pub autopilot: Option<String>,
+    pub alive: bool,
+    pub roll_deg: Option<f64>,
+    pub pitch_deg: Option<f64>,
+    pub heading_deg: Option<f64>,
+    pub attitude_age_ms: Option<u64>,
+    pub latitude_deg: Option<f64>,
+    pub longitude_deg: Option<f64>,
+    pub altitude_amsl_m: Option<f64>,
+    pub position_age_ms: Option<u64>,
+    /// Turning rate about Down as the autopilot reports it (286); 0 on the wire means that it does not know.
+    pub yaw_rate_dps: Option<f64>,
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct GimbalSnapshot {
+    pub name: String,
+    pub family: String,
+    pub manager_component_id: u8,
+    pub device_id: Option<u8>,
+    /// The device's `system/component`.
+    pub device: Option<String>,
+    /// `searching`, `alive` or `lost`.
+    pub state: String,
+    pub vendor: Option<String>,
+    pub model: Option<String>,
+    pub firmware: Option<String>,
+    pub attitude: AttitudeSnapshot,
+    pub setpoint: Option<SetpointSnapshot>,
+    /// Who holds primary control, as `system/component`.
+    pub primary: Option<String>,
+    pub secondary: Option<String>,
+    pub roi: Option<RoiSnapshot>,
+    pub flags: Vec<String>,
+    pub failure_flags: Vec<String>,
+    /// Sender to reason to count: what was refused.
+    pub rejected: BTreeMap<String, BTreeMap<String, u64>>,
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct AttitudeSnapshot {
+    pub roll_deg: Option<f64>,
+    pub pitch_deg: Option<f64>,
+    pub yaw_vehicle_deg: Option<f64>,
+    pub yaw_earth_deg: Option<f64>,
+    pub age_ms: Option<u64>,
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SetpointSnapshot {
+    /// `angle`, `rate`, `hold`, `retract`, `neutral` or `roi`.
+    pub mode: String,
+    pub pitch_deg: Option<f64>,
+    pub yaw_deg: Option<f64>,
+    /// `vehicle` or `earth`.
+    pub yaw_frame: Option<String>,
+    pub pitch_rate_dps: Option<f64>,
+    pub yaw_rate_dps: Option<f64>,
+    /// Whose demand it is, as `system/component`.
+    pub source: Option<String>,
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RoiSnapshot {
+    pub latitude_deg: f64,
+    pub longitude_deg: f64,
+    pub altitude_amsl_m: f64,
+}

@@ -1,0 +1,3 @@
+//! Gimbals behind one driver trait, a folder per family.
+
+pub mod settings;

@@ -1,0 +1,72 @@
+//! What the user may say of one gimbal.
+
+/// A `[[gimbal]]` entry.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GimbalSettings {
+    pub name: String,
+    pub family: Family,
+    /// Index of the link it is on; any link when unset.
+    pub link: Option<usize>,
+    /// The device's component id; the first gimbal found when unset.
+    pub component_id: Option<u8>,
+    pub manager_component_id: Option<u8>,
+    pub takeover: Takeover,
+    /// How often an active setpoint is repeated to the device, 5 to 50.
+    pub setpoint_rate_hz: u8,
+    pub device_yaw_frame: DeviceYawFrame,
+    /// Full deflection of manual control (288), degrees per second.
+    pub manual_pitch_rate_dps: f64,
+    pub manual_yaw_rate_dps: f64,
+}
+
+impl GimbalSettings {
+    /// The settings of a gimbal that was found without an entry.
+    pub fn found(name: String) -> Self {
+        Self {
+            name,
+            family: Family::Auto,
+            link: None,
+            component_id: None,
+            manager_component_id: None,
+            takeover: Takeover::Open,
+            setpoint_rate_hz: 20,
+            device_yaw_frame: DeviceYawFrame::Auto,
+            manual_pitch_rate_dps: 30.0,
+            manual_yaw_rate_dps: 30.0,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Family {
+    /// Found by listening.
+    Auto,
+    MavlinkV2,
+}
+
+impl Family {
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::MavlinkV2 => "mavlink_v2",
+        }
+    }
+}
+
+/// Who may take primary control from a holder that did not release it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Takeover {
+    /// Anybody; politeness is the client's business (Gimbal Protocol v2).
+    Open,
+    /// Nobody until the holder releases.
+    Ask,
+}
+
+/// In which frame the device wants its yaw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DeviceYawFrame {
+    /// What the device reports that it accepts.
+    Auto,
+    Vehicle,
+    Earth,
+}
