@@ -3,9 +3,11 @@
 //! `docs/architecture.md` tells how the parts fit together.
 
 pub mod bridge;
+pub mod channel;
 pub mod endpoint;
 pub mod gimbals;
 pub mod manager;
+pub mod router;
 pub mod timers;
 pub mod timestamp;
 pub mod wire;
