@@ -4,6 +4,7 @@
 
 pub mod bridge;
 pub mod endpoint;
+pub mod geometry;
 pub mod gimbals;
 pub mod manager;
 pub mod timers;
