@@ -5,6 +5,7 @@
 pub mod bridge;
 pub mod channel;
 pub mod endpoint;
+pub mod geometry;
 pub mod gimbals;
 pub mod manager;
 pub mod router;
