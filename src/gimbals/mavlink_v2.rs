@@ -1,0 +1,6 @@
+//! Gimbals that speak the device side of MAVLink Gimbal Protocol v2.
+
+pub mod driver;
+pub mod packet;
+
+pub use driver::MavlinkV2Driver;
