@@ -9,4 +9,5 @@ pub mod gimbals;
 pub mod manager;
 pub mod timers;
 pub mod timestamp;
+pub mod vehicle;
 pub mod wire;
