@@ -105,17 +105,12 @@ fn to_ecef(position: Position) -> Vector3<f64> {
     Vector3::new(across * cos_lon, across * sin_lon, along)
 }
 
-/// Bowring's method; its error after three steps is below a micrometre wherever something flies.
+/// Bowring's method, whose first step errs by less than 10 µm wherever something flies.
 fn from_ecef(ecef: Vector3<f64>) -> Position {
     let across = ecef.x.hypot(ecef.y);
-    let mut reduced = (ecef.z * EQUATOR_RADIUS_M).atan2(across * POLE_RADIUS_M);
-    let mut latitude = reduced;
-    for _ in 0..3 {
-        let (sin, cos) = reduced.sin_cos();
-        latitude = (ecef.z + SECOND_ECCENTRICITY_2 * POLE_RADIUS_M * sin.powi(3))
-            .atan2(across - ECCENTRICITY_2 * EQUATOR_RADIUS_M * cos.powi(3));
-        reduced = (POLE_RADIUS_M * latitude.sin()).atan2(EQUATOR_RADIUS_M * latitude.cos());
-    }
+    let (sin, cos) = (ecef.z * EQUATOR_RADIUS_M).atan2(across * POLE_RADIUS_M).sin_cos();
+    let latitude = (ecef.z + SECOND_ECCENTRICITY_2 * POLE_RADIUS_M * sin.powi(3))
+        .atan2(across - ECCENTRICITY_2 * EQUATOR_RADIUS_M * cos.powi(3));
     let (sin_lat, cos_lat) = latitude.sin_cos();
     let surface = EQUATOR_RADIUS_M * (1.0 - ECCENTRICITY_2 * sin_lat * sin_lat).sqrt();
     Position {
