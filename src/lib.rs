@@ -11,4 +11,5 @@ pub mod manager;
 pub mod router;
 pub mod timers;
 pub mod timestamp;
+pub mod vehicle;
 pub mod wire;
