@@ -1,6 +1,7 @@
 //! What a gimbal is told.
 
 use crate::geometry::{Angle, AngularRate, Yaw, YawFrame};
+use crate::wire::ids::GimbalFlags;
 
 /// One order to a gimbal, the same for every family.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,4 +44,44 @@ pub struct Stabilised {
 
 impl Stabilised {
     pub const BOTH: Self = Self { roll: true, pitch: true };
+}
+
+impl Setpoint {
+    /// The flags as 284 and 281 show them: exactly one frame bit, and `YAW_LOCK` exactly with the earth frame.
+    pub fn flags(&self) -> GimbalFlags {
+        match *self {
+            Setpoint::Retract => GimbalFlags::RETRACT | frame_flags(YawFrame::Vehicle) | lock_flags(Stabilised::BOTH),
+            Setpoint::Neutral => GimbalFlags::NEUTRAL | frame_flags(YawFrame::Vehicle) | lock_flags(Stabilised::BOTH),
+            Setpoint::Point(pointing) => frame_flags(pointing.yaw.frame()) | lock_flags(pointing.stabilised),
+            Setpoint::Turn(turning) => frame_flags(turning.yaw_frame) | lock_flags(turning.stabilised),
+        }
+    }
+}
+
+fn frame_flags(frame: YawFrame) -> GimbalFlags {
+    match frame {
+        YawFrame::Vehicle => GimbalFlags::YAW_IN_VEHICLE_FRAME,
+        YawFrame::Earth => GimbalFlags::YAW_IN_EARTH_FRAME | GimbalFlags::YAW_LOCK,
+    }
+}
+
+fn lock_flags(stabilised: Stabilised) -> GimbalFlags {
+    let mut flags = GimbalFlags::empty();
+    flags.set(GimbalFlags::ROLL_LOCK, stabilised.roll);
+    flags.set(GimbalFlags::PITCH_LOCK, stabilised.pitch);
+    flags
+}
+
+/// What yaw is measured from; the frame bits decide, `YAW_LOCK` for senders older than them. Both bits at once mean
+/// nothing: `None`.
+pub fn yaw_frame(flags: GimbalFlags) -> Option<YawFrame> {
+    let vehicle = flags.contains(GimbalFlags::YAW_IN_VEHICLE_FRAME);
+    let earth = flags.contains(GimbalFlags::YAW_IN_EARTH_FRAME);
+    match (vehicle, earth) {
+        (true, true) => None,
+        (true, false) => Some(YawFrame::Vehicle),
+        (false, true) => Some(YawFrame::Earth),
+        (false, false) if flags.contains(GimbalFlags::YAW_LOCK) => Some(YawFrame::Earth),
+        (false, false) => Some(YawFrame::Vehicle),
+    }
 }

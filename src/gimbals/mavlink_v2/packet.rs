@@ -14,7 +14,7 @@ use crate::geometry::{
 };
 use crate::gimbals::capabilities::Capabilities;
 use crate::gimbals::report::{GimbalAttitude, Identity};
-use crate::gimbals::setpoint::{Pointing, Setpoint, Stabilised, Turning};
+use crate::gimbals::setpoint::{Pointing, Setpoint, Turning, yaw_frame};
 use crate::wire::dialect::{
     COMMAND_LONG_DATA, CharArray, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA,
     GIMBAL_DEVICE_SET_ATTITUDE_DATA, MavMessage,
@@ -115,20 +115,6 @@ pub fn read_status(frame: &Frame<'_>) -> Option<DeviceStatus> {
     })
 }
 
-/// What yaw is measured from; the frame bits decide, `YAW_LOCK` for senders older than them. Both bits at once mean
-/// nothing: `None`.
-pub fn yaw_frame(flags: GimbalFlags) -> Option<YawFrame> {
-    let vehicle = flags.contains(GimbalFlags::YAW_IN_VEHICLE_FRAME);
-    let earth = flags.contains(GimbalFlags::YAW_IN_EARTH_FRAME);
-    match (vehicle, earth) {
-        (true, true) => None,
-        (true, false) => Some(YawFrame::Vehicle),
-        (false, true) => Some(YawFrame::Earth),
-        (false, false) if flags.contains(GimbalFlags::YAW_LOCK) => Some(YawFrame::Earth),
-        (false, false) => Some(YawFrame::Vehicle),
-    }
-}
-
 /// 284 for `device`. Exactly one frame bit is set, and `YAW_LOCK` exactly with the earth frame.
 pub fn set_attitude(device: MavId, setpoint: &Setpoint) -> MavMessage {
     let mut q = [f32::NAN; 4];
@@ -152,34 +138,10 @@ pub fn set_attitude(device: MavId, setpoint: &Setpoint) -> MavMessage {
         angular_velocity_x: rates[0],
         angular_velocity_y: rates[1],
         angular_velocity_z: rates[2],
-        flags: setpoint_flags(setpoint).bits(),
+        flags: setpoint.flags().bits(),
         target_system: device.system,
         target_component: device.component,
     })
-}
-
-/// The flags of a setpoint as 284 and 281 show them.
-pub fn setpoint_flags(setpoint: &Setpoint) -> GimbalFlags {
-    match *setpoint {
-        Setpoint::Retract => GimbalFlags::RETRACT | frame_flags(YawFrame::Vehicle) | lock_flags(Stabilised::BOTH),
-        Setpoint::Neutral => GimbalFlags::NEUTRAL | frame_flags(YawFrame::Vehicle) | lock_flags(Stabilised::BOTH),
-        Setpoint::Point(pointing) => frame_flags(pointing.yaw.frame()) | lock_flags(pointing.stabilised),
-        Setpoint::Turn(turning) => frame_flags(turning.yaw_frame) | lock_flags(turning.stabilised),
-    }
-}
-
-fn frame_flags(frame: YawFrame) -> GimbalFlags {
-    match frame {
-        YawFrame::Vehicle => GimbalFlags::YAW_IN_VEHICLE_FRAME,
-        YawFrame::Earth => GimbalFlags::YAW_IN_EARTH_FRAME | GimbalFlags::YAW_LOCK,
-    }
-}
-
-fn lock_flags(stabilised: Stabilised) -> GimbalFlags {
-    let mut flags = GimbalFlags::empty();
-    flags.set(GimbalFlags::ROLL_LOCK, stabilised.roll);
-    flags.set(GimbalFlags::PITCH_LOCK, stabilised.pitch);
-    flags
 }
 
 /// `REQUEST_MESSAGE` for `message_id`.
