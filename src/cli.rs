@@ -136,7 +136,7 @@ pub enum SimCommand {
 Examples:
   gimbald sim gimbal --endpoint udpout:127.0.0.1:14541
   gimbald sim gimbal --endpoint serial:/dev/ttyUSB1:115200 --component-id 171
-  gimbald sim gimbal --endpoint tcpin:0.0.0.0:5790 --fault reboot --seed 7
+  gimbald sim gimbal --endpoint tcpin:0.0.0.0:5790 --fault drop=0.1 --fault reboot@20s --seed 7
 
 {ENDPOINTS}"))]
     Gimbal(SimGimbalArgs),
@@ -169,7 +169,7 @@ pub struct SimGimbalArgs {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
     pub system_id: u8,
 
-    /// Something that goes wrong; may be given several times
+    /// Something that goes wrong, such as drop=0.1 or reboot@20s; may be given several times
     #[arg(long = "fault", value_name = "FAULT")]
     pub faults: Vec<String>,
 

@@ -1,7 +1,7 @@
 //! The operator's settings: one TOML file, overridden by `GIMBALD__` environment variables.
 //!
-//! The file is read into values that know where they stand ([`document`]), variables are laid over it
-//! ([`environment`]), each value is checked for itself ([`schema`]), then all of them together ([`settings`]). Whatever
+//! The file is read into values that know where they stand (`document.rs`), variables are laid over it
+//! (`environment.rs`), each value is checked for itself (`schema.rs`), then all of them together (`checks.rs`). Whatever
 //! is wrong is collected on the way, so that everything is reported at once.
 
 mod checks;
