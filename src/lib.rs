@@ -3,8 +3,12 @@
 //! `docs/architecture.md` tells how the parts fit together.
 
 pub mod bridge;
+pub mod commands;
+pub mod config;
+pub mod daemon;
 pub mod endpoint;
 pub mod gimbals;
+pub mod http;
 pub mod manager;
 pub mod timers;
 pub mod timestamp;

@@ -1,0 +1,3 @@
+//! Runs the core: the clock, the links' tasks, and the window that others see it through.
+
+pub mod window;
