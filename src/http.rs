@@ -8,7 +8,7 @@ pub(crate) mod canned;
 mod fresh;
 mod hosts;
 mod page;
-mod readiness;
+pub mod readiness;
 mod routes;
 mod server;
 #[cfg(test)]

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use tokio::sync::{mpsc, oneshot};
-use tokio::time::{Instant, sleep_until, timeout};
+use tokio::time::{MissedTickBehavior, interval, timeout};
 
 use crate::bridge::snapshot::Snapshot;
 use crate::daemon::window::{CoreHandle, CoreRequest};
@@ -33,7 +33,7 @@ impl FreshSnapshots {
     /// The second half does the asking: it must be run, and ends when all of the first are dropped.
     pub fn of(core: CoreHandle) -> (Self, Collector) {
         let (asks, waiting) = mpsc::channel(WAITING);
-        let collector = Collector { core, asks: waiting, next: Instant::now(), unanswered: false };
+        let collector = Collector { core, asks: waiting, unanswered: false };
         (Self { asks }, collector)
     }
 
@@ -52,21 +52,20 @@ impl FreshSnapshots {
 pub struct Collector {
     core: CoreHandle,
     asks: mpsc::Receiver<Ask>,
-    /// When the core may be asked again.
-    next: Instant,
     /// A request lies with the core; a core that is stuck does not find a heap of them when it comes back.
     unanswered: bool,
 }
 
 impl Collector {
     pub async fn run(mut self) {
+        let mut pace = interval(INTERVAL);
+        pace.set_missed_tick_behavior(MissedTickBehavior::Delay);
         while let Some(first) = self.asks.recv().await {
-            sleep_until(self.next).await;
+            pace.tick().await;
             let mut waiting = vec![first];
             while let Ok(ask) = self.asks.try_recv() {
                 waiting.push(ask);
             }
-            self.next = Instant::now() + INTERVAL;
             if let Some(snapshot) = self.ask_core().await {
                 for ask in waiting {
                     drop(ask.send(Arc::clone(&snapshot))); // an asker that gave up has gone
@@ -101,6 +100,7 @@ impl Collector {
 #[cfg(test)]
 mod tests {
     use std::sync::atomic::{AtomicU32, Ordering};
+    use std::time::Instant;
 
     use tokio::sync::watch;
 
@@ -123,6 +123,11 @@ mod tests {
         let (requests, received) = mpsc::channel(4);
         let (published, snapshots) = watch::channel(Arc::default());
         (CoreHandle { requests, snapshots }, Core { requests: received, snapshots: published })
+    }
+
+    #[expect(clippy::disallowed_methods, reason = "how fast the core may be asked shows in real time only")]
+    fn now() -> Instant {
+        Instant::now()
     }
 
     fn block_on<F: Future>(future: F) -> F::Output {
@@ -163,7 +168,7 @@ mod tests {
                     }
                 });
             }
-            let start = Instant::now();
+            let start = now();
             for number in 0..=10 {
                 core.answer(f64::from(number)).await;
             }
@@ -199,7 +204,7 @@ mod tests {
             let (fresh, collector) = FreshSnapshots::of(handle);
             tokio::spawn(collector.run());
             drop(core);
-            let start = Instant::now();
+            let start = now();
             assert_eq!(fresh.within(Duration::from_secs(15)).await, None);
             assert!(start.elapsed() < CORE_DEADLINE);
         });

@@ -99,8 +99,12 @@ fn bind(listen: SocketAddr) -> io::Result<TcpListener> {
 
 fn remedy(kind: io::ErrorKind) -> &'static str {
     match kind {
-        io::ErrorKind::AddrInUse => "another program listens there (`ss -ltnp` names it): stop it or set another [http] listen",
-        io::ErrorKind::AddrNotAvailable => "no network interface has this address yet: bring it up or set another [http] listen",
+        io::ErrorKind::AddrInUse => {
+            "another program listens there (`ss -ltnp` names it): stop it or set another [http] listen"
+        }
+        io::ErrorKind::AddrNotAvailable => {
+            "no network interface has this address yet: bring it up or set another [http] listen"
+        }
         io::ErrorKind::PermissionDenied => "ports below 1024 are reserved: set a higher port in [http] listen",
         _ => "check [http] listen",
     }

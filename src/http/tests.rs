@@ -126,7 +126,7 @@ fn a_core_that_hangs_is_told_in_time() {
         ("/readyz", 500, json!({"ready": false, "reasons": ["the core did not answer within 500 ms"]})),
         ("/healthz", 1000, json!({"error": "the core did not answer within 1 s"})),
     ] {
-        let start = Instant::now();
+        let start = now();
         let answer = window.get(path);
         assert_eq!((answer.status, answer.json()), (503, expected), "{path}");
         assert!(start.elapsed() < Duration::from_millis(least + 3000), "{path} took {:?}", start.elapsed());
@@ -152,7 +152,8 @@ fn what_is_not_there_is_refused_as_json() {
         assert_eq!((answer.status, answer.json()), (404, error), "{path}");
     }
     for method in ["POST", "PUT", "DELETE", "OPTIONS", "PATCH", "TRACE"] {
-        let answer = window.ask(&format!("{method} /api/v1/status HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"));
+        let answer =
+            window.ask(&format!("{method} /api/v1/status HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"));
         let error = json!({"error": "this window is read-only: use GET"});
         assert_eq!((answer.status, answer.json(), answer.header("allow")), (405, error, Some("GET, HEAD")), "{method}");
     }
@@ -168,7 +169,9 @@ fn every_answer_says_how_it_may_be_used() {
         assert_eq!(answer.header("referrer-policy"), Some("no-referrer"), "{path}");
         assert_eq!(answer.header("cross-origin-resource-policy"), Some("same-origin"), "{path}");
         assert_eq!(answer.header("access-control-allow-origin"), None, "{path}");
-        assert!(answer.header("content-security-policy").is_some_and(|policy| policy.starts_with("default-src 'none'")));
+        assert!(
+            answer.header("content-security-policy").is_some_and(|policy| policy.starts_with("default-src 'none'"))
+        );
     }
 }
 
@@ -177,7 +180,8 @@ fn every_answer_says_how_it_may_be_used() {
 fn another_host_is_refused() {
     let window = Window::of(canned::snapshot());
     for path in ["/", "/api/v1/status"] {
-        let answer = window.ask(&format!("GET {path} HTTP/1.1\r\nHost: evil.example:8080\r\nConnection: close\r\n\r\n"));
+        let answer =
+            window.ask(&format!("GET {path} HTTP/1.1\r\nHost: evil.example:8080\r\nConnection: close\r\n\r\n"));
         assert_eq!(answer.status, 403, "{path}");
         assert!(answer.json()["error"].as_str().is_some_and(|error| error.contains("http://localhost")));
     }
@@ -208,7 +212,7 @@ fn slow_headers_are_cut() {
     let header = Duration::from_millis(200);
     let window = Window::open(Some(Snapshot::default()), Limits { header, lifetime: FOREVER, ..Limits::default() });
     for beginning in ["", "GET /healthz HT", "GET /healthz HTTP/1.1\r\nHost: localhost\r\n"] {
-        let start = Instant::now();
+        let start = now();
         let mut client = window.connect();
         client.write_all(beginning.as_bytes()).expect("the kernel takes it");
         let mut answer = String::new();
@@ -289,7 +293,7 @@ fn the_thread_ends_with_the_core() {
     let thread = spawn(settings, core).expect("a thread");
     assert!(!thread.is_finished());
     drop((requests, snapshots));
-    let start = Instant::now();
+    let start = now();
     while !thread.is_finished() {
         assert!(start.elapsed() < PATIENCE, "the thread outlives the core");
         std::thread::yield_now();
@@ -303,6 +307,11 @@ const HEALTHZ: &[u8] = b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection:
 const FOREVER: Duration = Duration::from_secs(600);
 /// How long a test waits for what must happen.
 const PATIENCE: Duration = Duration::from_secs(20);
+
+#[expect(clippy::disallowed_methods, reason = "time-outs of real sockets show in real time only")]
+fn now() -> Instant {
+    Instant::now()
+}
 
 fn core() -> (CoreHandle, mpsc::Receiver<CoreRequest>, watch::Sender<Arc<Snapshot>>) {
     let (requests, received) = mpsc::channel(4);
