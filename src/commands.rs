@@ -1,3 +1,4 @@
 //! One module for each command: what it does with its arguments, and how it ends.
 
 pub mod check;
+pub mod status;
