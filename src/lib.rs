@@ -4,9 +4,12 @@
 
 pub mod bridge;
 pub mod channel;
+pub mod config;
+pub mod daemon;
 pub mod endpoint;
 pub mod geometry;
 pub mod gimbals;
+pub mod links;
 pub mod manager;
 pub mod router;
 pub mod timers;

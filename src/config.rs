@@ -1,0 +1,3 @@
+//! What the operator said, checked.
+
+pub mod settings;

@@ -1,0 +1,10 @@
+//! Runs the core: clock, links, state file, service manager, and the window that others see it through.
+
+mod channels;
+mod clock;
+mod event_loop;
+mod shutdown;
+pub mod supervisor;
+mod system_id_file;
+mod systemd;
+pub mod window;
