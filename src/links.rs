@@ -79,14 +79,9 @@ pub fn link(endpoint: &Endpoint) -> Box<dyn Link> {
 
 /// The cause in plain words, without the number of the error.
 fn cause(error: &io::Error) -> String {
-    match error.raw_os_error() {
-        Some(code) => {
-            let text = Errno::from_raw(code).desc();
-            let mut letters = text.chars();
-            letters.next().map(|first| first.to_lowercase().chain(letters).collect()).unwrap_or_default()
-        }
-        None => error.to_string(),
-    }
+    let text = error.raw_os_error().map_or_else(|| error.to_string(), |code| Errno::from_raw(code).desc().to_owned());
+    let mut letters = text.chars();
+    letters.next().map(|first| first.to_lowercase().chain(letters).collect()).unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -96,6 +91,6 @@ mod tests {
     #[test]
     fn a_cause_is_told_in_plain_words() {
         assert_eq!(cause(&Errno::EADDRINUSE.into()), "address already in use");
-        assert_eq!(cause(&io::Error::new(io::ErrorKind::TimedOut, "no answer")), "no answer");
+        assert_eq!(cause(&io::Error::new(io::ErrorKind::NotFound, "No such file")), "no such file");
     }
 }

@@ -6,9 +6,8 @@ use std::pin::pin;
 use std::task::Poll;
 use std::time::Duration;
 
-use super::inbox::{Event, Inbox, PeerIndex, PeerSet};
-use super::{Link, Progress, link};
-use crate::endpoint::Endpoint;
+use super::inbox::{Event, Inbox, PEERS, PeerIndex, PeerSet, READS};
+use super::{Link, Progress};
 use crate::timestamp::Timestamp;
 
 /// No wait of a test is longer; one that gets so far fails.
@@ -28,43 +27,25 @@ pub enum Seen {
 }
 
 /// A link, the time that it is told, and what it said and was not looked at yet.
-pub struct Rig {
+pub struct Rig<L> {
     runtime: tokio::runtime::Runtime,
-    link: Box<dyn Link>,
+    pub link: L,
     inbox: Inbox,
     pub now: Timestamp,
     seen: std::collections::VecDeque<Seen>,
 }
 
-impl Rig {
-    pub fn new(endpoint: &str) -> Self {
-        let endpoint: Endpoint = endpoint.parse().expect("the test names an endpoint");
+impl<L: Link> Rig<L> {
+    pub fn new(link: L) -> Self {
         let runtime =
             tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime can be made");
-        Self {
-            runtime,
-            link: link(&endpoint),
-            inbox: Inbox::default(),
-            now: Timestamp::from_secs(100),
-            seen: Default::default(),
-        }
+        let now = Timestamp::from_secs(100);
+        Self { runtime, link, inbox: Inbox::default(), now, seen: Default::default() }
     }
 
     /// Time passes for the link, not for the test.
     pub fn pass(&mut self, duration: Duration) {
         self.now += duration;
-    }
-
-    pub fn poll_timeout(&self) -> Option<Timestamp> {
-        self.link.poll_timeout()
-    }
-
-    pub fn has_unsent(&self) -> bool {
-        self.link.has_unsent()
-    }
-
-    pub fn refuse(&mut self, peer: PeerIndex) {
-        self.link.refuse(peer);
     }
 
     pub fn send(&mut self, peers: impl Into<PeerSet>, frame: &[u8]) {
@@ -86,6 +67,11 @@ impl Rig {
         assert_eq!(self.next_within(Duration::from_millis(20)), None);
     }
 
+    /// What the link says without waiting for anything.
+    pub fn poll_once(&mut self) -> Option<Seen> {
+        self.next_within(Duration::ZERO)
+    }
+
     fn next_within(&mut self, patience: Duration) -> Option<Seen> {
         let Self { runtime, link, inbox, now, seen } = self;
         runtime.block_on(async {
@@ -94,6 +80,7 @@ impl Rig {
                 while seen.is_empty() {
                     inbox.clear();
                     let progress = link.poll(*now, cx, inbox);
+                    assert!(inbox.len() <= READS + 2 * PEERS + 2, "a batch is bounded");
                     seen.extend((0..inbox.len()).map(|index| Seen::of(inbox.event(index))));
                     if progress == Progress::Idle && seen.is_empty() {
                         return patience.as_mut().poll(cx).map(|()| None);

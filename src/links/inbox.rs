@@ -152,8 +152,11 @@ impl Inbox {
         self.entries.push(Entry::PeerLeft(peer));
     }
 
+    /// Says nothing about no frames.
     pub fn send_failed(&mut self, peer: PeerIndex, frames: u32, reason: &'static str) {
-        self.entries.push(Entry::SendFailed(peer, frames, reason));
+        if frames > 0 {
+            self.entries.push(Entry::SendFailed(peer, frames, reason));
+        }
     }
 
     /// The buffers that are still free, [`READ_LENGTH`] long each.

@@ -25,9 +25,7 @@ impl SendFailures {
         }
         for (peer, entry) in self.peers.iter_mut().enumerate() {
             let (frames, reason) = std::mem::take(entry);
-            if frames > 0 {
-                inbox.send_failed(peer, frames, reason);
-            }
+            inbox.send_failed(peer, frames, reason);
         }
     }
 }

@@ -116,3 +116,93 @@ impl Link for TcpClient {
         // The link has one peer for ever; without a channel nothing is sent to it, and it is asked for nothing.
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::io::{Read, Write};
+    use std::net::TcpListener;
+
+    use super::super::harness::{PATIENCE, Rig, Seen, noise, write_aside};
+    use super::*;
+
+    fn listener() -> (TcpListener, SocketAddr) {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+        let address = listener.local_addr().expect("it is bound");
+        (listener, address)
+    }
+
+    fn connected(listener: &TcpListener, address: SocketAddr) -> (Rig<TcpClient>, std::net::TcpStream) {
+        let mut rig = Rig::new(TcpClient::new(address));
+        assert_eq!(rig.next(), Seen::Up);
+        assert_eq!(rig.next(), Seen::Appeared(PEER, address.to_string()));
+        let (stream, _) = listener.accept().expect("it connected");
+        stream.set_read_timeout(Some(PATIENCE)).expect("a socket takes it");
+        (rig, stream)
+    }
+
+    #[test]
+    fn bytes_go_both_ways() {
+        let (listener, address) = listener();
+        let (mut rig, mut stream) = connected(&listener, address);
+
+        rig.send(PEER, b"hello");
+        let mut buffer = [0; 5];
+        stream.read_exact(&mut buffer).expect("the frame arrives");
+        assert_eq!(&buffer, b"hello");
+        stream.write_all(b"welcome").expect("sent");
+        assert_eq!(rig.receive(PEER, 7), b"welcome");
+    }
+
+    /// "`tcpout`: … TCP with back-off to 2 s".
+    #[test]
+    fn a_refused_connection_is_tried_again_with_growing_waits() {
+        let (listener, address) = listener();
+        drop(listener);
+        let mut rig = Rig::new(TcpClient::new(address));
+        for wait in [250, 500, 1_000, 2_000, 2_000] {
+            assert_eq!(rig.next(), Seen::Down(format!("cannot connect to {address}: connection refused")));
+            assert_eq!(rig.link.poll_timeout(), Some(rig.now + Duration::from_millis(wait)));
+            rig.pass(Duration::from_millis(wait));
+        }
+    }
+
+    #[test]
+    fn a_connection_that_ends_is_made_again() {
+        let (listener, address) = listener();
+        let (mut rig, stream) = connected(&listener, address);
+        drop(stream);
+        assert_eq!(rig.next(), Seen::Down(format!("lost {address}: the other side closed the connection")));
+
+        rig.pass(Duration::from_millis(250));
+        assert_eq!(rig.next(), Seen::Up);
+    }
+
+    /// "connect non-blocking with 5 s time-out".
+    #[test]
+    fn an_attempt_without_an_answer_is_given_up() {
+        // A listener whose queue is full answers no further attempt.
+        let socket = socket2::Socket::new(socket2::Domain::IPV4, socket2::Type::STREAM, None).expect("a socket");
+        let any: SocketAddr = "127.0.0.1:0".parse().expect("an address");
+        socket.bind(&any.into()).expect("a free port");
+        socket.listen(0).expect("it is bound");
+        let address = socket.local_addr().expect("it is bound").as_socket().expect("an IP address");
+        let _in_the_queue = std::net::TcpStream::connect(address).expect("there is one place");
+
+        let mut rig = Rig::new(TcpClient::new(address));
+        rig.expect_silence();
+        assert_eq!(rig.link.poll_timeout(), Some(rig.now + Duration::from_secs(5)));
+        rig.pass(Duration::from_secs(5));
+        assert_eq!(rig.next(), Seen::Down(format!("cannot connect to {address}: no answer")));
+    }
+
+    #[test]
+    fn ten_megabytes_pass_without_growth() {
+        let (listener, address) = listener();
+        let (mut rig, stream) = connected(&listener, address);
+        let bytes = noise(10_000_000);
+        let writer = write_aside(stream, bytes.clone());
+
+        assert!(rig.receive(PEER, bytes.len()) == bytes, "what arrives is what was sent");
+        writer.join().expect("all was written");
+    }
+}
