@@ -13,6 +13,7 @@ pub mod exit_code;
 pub mod geometry;
 pub mod gimbals;
 pub mod http;
+pub mod links;
 pub mod manager;
 pub mod router;
 pub mod timers;

@@ -14,9 +14,8 @@ use tokio::net::TcpStream;
 use tokio::time::{sleep, timeout};
 
 use crate::bridge::snapshot::Snapshot;
-
-/// Where a daemon listens unless it was told otherwise.
-pub const DEFAULT_URL: &str = "http://127.0.0.1:8080";
+use crate::cli::StatusArgs;
+use crate::exit_code::ExitCode;
 
 const STATUS_PATH: &str = "/api/v1/status";
 const DEADLINE: Duration = Duration::from_secs(2);
@@ -24,20 +23,9 @@ const REDRAW: Duration = Duration::from_secs(1);
 /// A status is a few kilobytes; whatever sends more than this is not gimbald.
 const ANSWER_BYTES: usize = 1024 * 1024;
 
-/// What `gimbald status` was asked.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct StatusOptions {
-    /// `http://HOST[:PORT]`, perhaps with a path before `/api/v1/status`.
-    pub url: String,
-    /// Ask again each second until Ctrl-C.
-    pub watch: bool,
-    /// Print the JSON as the daemon gave it.
-    pub json: bool,
-}
-
 #[derive(Debug, thiserror::Error)]
 pub enum StatusError {
-    #[error("{0:?} is not an address that can be asked: expected http://HOST:PORT, for example {DEFAULT_URL}")]
+    #[error("{0:?} is not an address that can be asked: expected http://HOST:PORT, for example http://127.0.0.1:8080")]
     Url(String),
     #[error(
         "no gimbald answers at {url} ({source}): is it running (systemctl status gimbald), \
@@ -56,20 +44,32 @@ pub enum StatusError {
 
 impl StatusError {
     /// As in sysexits: 64 for a wrong argument, 69 for a daemon that is not there.
-    pub fn exit_code(&self) -> u8 {
+    pub fn exit_code(&self) -> ExitCode {
         match self {
-            Self::Url(_) => 64,
+            Self::Url(_) => ExitCode::Usage,
             Self::Unreachable { .. }
             | Self::TimedOut { .. }
             | Self::Refused { .. }
             | Self::NotGimbald { .. }
-            | Self::Output(_) => 69,
+            | Self::Output(_) => ExitCode::Unavailable,
+        }
+    }
+}
+
+/// Prints the status, and to `errors` why it could not.
+pub fn status(arguments: &StatusArgs, errors: &mut impl Write) -> ExitCode {
+    match run(arguments) {
+        Ok(()) => ExitCode::Ok,
+        Err(error) => {
+            // The exit code says it too; nobody is left to tell when the reader is gone.
+            let _ = writeln!(errors, "gimbald: {error}");
+            error.exit_code()
         }
     }
 }
 
 /// Prints the status once, or until Ctrl-C; while watching, a daemon that does not answer is shown and asked again.
-pub fn run(options: &StatusOptions) -> Result<(), StatusError> {
+fn run(options: &StatusArgs) -> Result<(), StatusError> {
     let target = Target::parse(&options.url)?;
     let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build();
     let runtime = runtime.map_err(StatusError::Output)?;
@@ -249,7 +249,7 @@ mod tests {
             "http://drone/?x=1",
         ] {
             let error = Target::parse(url).expect_err(url);
-            assert_eq!((error.exit_code(), error.to_string()), (64, format!(
+            assert_eq!((error.exit_code(), error.to_string()), (ExitCode::Usage, format!(
                 "{url:?} is not an address that can be asked: expected http://HOST:PORT, for example http://127.0.0.1:8080"
             )));
         }
@@ -263,7 +263,7 @@ mod tests {
         drop(free);
         let error = run(&options(address)).expect_err("nobody listens");
         let text = error.to_string();
-        assert_eq!(error.exit_code(), 69);
+        assert_eq!(error.exit_code(), ExitCode::Unavailable);
         assert!(text.starts_with(&format!("no gimbald answers at http://{address} (")), "{text}");
         assert!(text.contains("systemctl status gimbald") && text.contains("--url"), "{text}");
     }
@@ -277,7 +277,7 @@ mod tests {
         let expected = format!(
             "gimbald at http://{address} answers 503 Service Unavailable: the core did not answer within 500 ms"
         );
-        assert_eq!((error.exit_code(), error.to_string()), (69, expected));
+        assert_eq!((error.exit_code(), error.to_string()), (ExitCode::Unavailable, expected));
         assert!(server.join().expect("no panic").starts_with("GET /api/v1/status HTTP/1.1\r\nhost: 127.0.0.1:"));
     }
 
@@ -294,7 +294,7 @@ mod tests {
             let (address, server) = server(answer.to_owned());
             let error = run(&options(address)).expect_err(answer);
             assert!(matches!(error, StatusError::NotGimbald { .. }), "{answer:?}: {error:?}");
-            assert_eq!(error.exit_code(), 69);
+            assert_eq!(error.exit_code(), ExitCode::Unavailable);
             server.join().expect("no panic");
         }
     }
@@ -330,8 +330,8 @@ mod tests {
         assert!(!text.contains(|char: char| char.is_control() && char != '\n'));
     }
 
-    fn options(address: SocketAddr) -> StatusOptions {
-        StatusOptions { url: format!("http://{address}"), watch: false, json: false }
+    fn options(address: SocketAddr) -> StatusArgs {
+        StatusArgs { url: format!("http://{address}"), watch: false, json: false }
     }
 
     /// Gives one client `answer`; ends with what it asked.
