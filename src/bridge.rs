@@ -146,14 +146,10 @@ impl Bridge {
                 if let Some(link) = self.channels.link_mut(link) {
                     link.up = true;
                     link.reason = None;
-                    tracing::info!(link = link.settings.name, "link is up");
                 }
             }
             Input::LinkDown { link, reason } => {
                 if let Some(link) = self.channels.link_mut(link) {
-                    if link.up || link.reason.as_deref() != Some(reason) {
-                        tracing::warn!(link = link.settings.name, reason, "link is down");
-                    }
                     link.up = false;
                     link.reason = Some(reason.to_owned());
                 }

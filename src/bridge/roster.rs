@@ -177,7 +177,7 @@ impl Roster {
 pub const fn manager_of_device(device: u8) -> Option<u8> {
     match device {
         component::GIMBAL => Some(component::ONBOARD_COMPUTER),
-        component::GIMBAL2..=component::GIMBAL4 => Some(component::ONBOARD_COMPUTER + 1 + device - component::GIMBAL2),
+        component::GIMBAL2..=component::GIMBAL4 => Some(device - component::GIMBAL2 + component::ONBOARD_COMPUTER + 1),
         _ => None,
     }
 }

@@ -312,7 +312,7 @@ mod tests {
 
     #[test]
     fn json_is_what_the_daemon_gave() {
-        let target = Target::parse(DEFAULT_URL).expect("our own address");
+        let target = Target::parse("http://127.0.0.1:8080").expect("our own address");
         let given = br#"{"version":"9","later":{"key":null}}"#;
         let printed = report(given, &target, true).expect("JSON is passed on, of whatever version");
         assert_eq!(printed.as_bytes(), [&given[..], b"\n"].concat());
@@ -324,7 +324,7 @@ mod tests {
         let mut snapshot = canned::snapshot();
         snapshot.gimbals[0].vendor = Some("\x1b[2J\u{9b}31mAc\nme\u{202e}".into());
         let answer = serde_json::to_vec(&snapshot).expect("JSON");
-        let target = Target::parse(DEFAULT_URL).expect("our own address");
+        let target = Target::parse("http://127.0.0.1:8080").expect("our own address");
         let text = report(&answer, &target, false).expect("a snapshot");
         assert!(text.contains("\u{fffd}[2J\u{fffd}31mAc\u{fffd}me\u{fffd} Pixy"), "{text}");
         assert!(!text.contains(|char: char| char.is_control() && char != '\n'));
