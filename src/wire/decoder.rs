@@ -4,12 +4,13 @@
 //! damaged length never takes a neighbour with it. A frame of an unknown message cannot be checked and passes only
 //! *in sync*: where the frame before it ended, or at the start of a datagram. Even there it must have been closed
 //! with some `CRC_EXTRA`, must not be a known message with one wrong bit in its id, and gives way to a checked frame
-//! that begins inside it. What is taken depends on the bytes alone, never on the reads that brought them.
+//! that begins inside it; so does a signature, which no checksum covers. What is taken depends on the bytes alone, never on the reads that brought them.
 
+use std::ops::Range;
 use std::time::Duration;
 
 use super::crc::Crc;
-use super::frame::{Frame, Header, INCOMPAT_SIGNED, MAGIC_V1, MAGIC_V2, MAX_FRAME_LEN, Version};
+use super::frame::{CRC_LEN, Frame, Header, INCOMPAT_SIGNED, MAGIC_V1, MAGIC_V2, MAX_FRAME_LEN, Version};
 use super::target::message_shape;
 use crate::timestamp::Timestamp;
 
@@ -255,7 +256,7 @@ impl Scanner {
             return examine_unknown(bytes, header, ahead);
         }
         match checks_out(bytes, &header) {
-            Some(true) => Found::Frame(header),
+            Some(true) => examine_signature(bytes, header, ahead),
             Some(false) => {
                 self.counters.crc_errors += u64::from(self.in_sync);
                 Found::NoFrame
@@ -298,8 +299,20 @@ fn examine_unknown(bytes: &[u8], header: Header, ahead: Ahead) -> Found {
     if !crc.can_finish_as(sum_of(bytes, &header)) || is_known_but_for_one_bit(bytes, &header) {
         return Found::NoFrame;
     }
+    unless_frame_begins_in(1..header.frame_len(), bytes, header, ahead)
+}
+
+/// Whether the checked frame that `bytes` start with is whole.
+///
+/// The checksum leaves a signature out, so a frame that broke off inside it would take the start of the next for it.
+fn examine_signature(bytes: &[u8], header: Header, ahead: Ahead) -> Found {
+    unless_frame_begins_in(header.payload_end() + CRC_LEN..header.frame_len(), bytes, header, ahead)
+}
+
+/// The frame of `header`, unless a checked frame of a known message begins at one of `positions`.
+fn unless_frame_begins_in(positions: Range<usize>, bytes: &[u8], header: Header, ahead: Ahead) -> Found {
     let mut open = false;
-    for at in 1..header.frame_len() {
+    for at in positions {
         match holds_known_frame(&bytes[at..]) {
             Some(true) => return Found::NoFrame,
             Some(false) => {}
