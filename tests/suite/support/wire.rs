@@ -146,6 +146,16 @@ impl Random {
         }
     }
 
+    /// A valid frame of some known message without a signature.
+    pub fn unsigned_frame(&mut self, sequence: u8) -> Vec<u8> {
+        loop {
+            let frame = self.known_frame(sequence);
+            if frame[0] == 0xfe || frame[2] == 0 {
+                return frame;
+            }
+        }
+    }
+
     /// A payload cut anywhere, as if zeros had followed.
     fn payload_v2(&mut self, shape: &MessageShape) -> Vec<u8> {
         let len = 1 + self.below(usize::from(shape.max_len));
