@@ -11,10 +11,12 @@ use gimbald::wire::{DatagramFrames, StreamDecoder, WireCounters};
 
 use crate::support::tlog;
 
-/// Every recording, with its links and what decoding must find on each: frames, and among them frames of unknown
-/// messages. None was damaged on its way.
+/// A link of a recording: its name, how many frames it carried, and how many of them of unknown messages.
+type Link = (&'static str, u64, u64);
+
+/// Every recording with its links. No frame was damaged on its way.
 #[rustfmt::skip]
-const CAPTURES: [(&str, &[(&str, u64, u64)]); 5] = [
+const CAPTURES: [(&str, &[Link]); 5] = [
     ("ap_gremsy_a",  &[("gimbal",    1365, 0), ("ground",    1061, 0)]),
     ("ap_none",      &[("ground",    548, 0)]),
     ("ap_storm32",   &[("gimbal",    1051, 0), ("ground",    892, 0)]),
