@@ -4,7 +4,7 @@ use std::io::Cursor;
 use std::slice::from_ref;
 
 use gimbald::wire::dialect::{AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA, COMMAND_ACK_DATA, HEARTBEAT_DATA};
-use gimbald::wire::target::message_shape;
+use gimbald::wire::target::{known_messages, message_shape};
 use gimbald::wire::{DatagramFrames, WireCounters};
 use mavlink::dialects::storm32::MavMessage as FullMessage;
 use mavlink::error::MessageReadError;
@@ -99,6 +99,23 @@ fn no_single_flipped_bit_makes_another_frame() {
             bytes.extend_from_slice(&behind);
 
             assert_eq!(decode_datagram(&bytes).frames, alone, "bit {bit} of {whole:02x?}");
+        }
+    }
+}
+
+/// The same for the bits of the id, which can make a known message an unknown one: every message at every length. What
+/// a flipped bit does to a checksum does not depend on the content.
+#[test]
+fn no_single_flipped_bit_in_the_id_makes_an_unknown_message() {
+    for shape in known_messages() {
+        for len in 1..=usize::from(shape.max_len) {
+            let whole = frame_v2(shape.id, shape.crc_extra, 0, &vec![1; len], None);
+            for bit in 8 * 7..8 * 10 {
+                let mut damaged = whole.clone();
+                damaged[bit / 8] ^= 1 << (bit % 8);
+
+                assert_eq!(DatagramFrames::new(&damaged).next_frame(), None, "bit {bit} of {whole:02x?}");
+            }
         }
     }
 }
