@@ -4,7 +4,8 @@
 //! damaged length never takes a neighbour with it. A frame of an unknown message cannot be checked and passes only
 //! *in sync*: where the frame before it ended, or at the start of a datagram. Even there it must have been closed
 //! with some `CRC_EXTRA`, must not be a known message with one wrong bit in its id, and gives way to a checked frame
-//! that begins inside it; so does a signature, which no checksum covers. What is taken depends on the bytes alone, never on the reads that brought them.
+//! that begins inside it; so does a signature, which no checksum covers. What is taken depends on the bytes alone,
+//! never on the reads that brought them.
 
 use std::ops::Range;
 use std::time::Duration;

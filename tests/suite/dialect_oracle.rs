@@ -16,8 +16,8 @@ use proptest::prelude::*;
 /// Messages that the public definitions have extended since the crate's: id, and the longest payload there and here.
 const LONGER_HERE: [(u32, usize, usize); 1] = [(435, 46, 47)];
 
-/// Every message of the crate that our table leaves out, because it belongs to a vendor's dialect that no component on a
-/// gimbal's links speaks; such a message is forwarded as an unknown one.
+/// Every message of the crate that our table leaves out, because it belongs to a vendor's dialect that no component on
+/// a gimbal's links speaks; such a message is forwarded as an unknown one.
 #[rustfmt::skip]
 const LEFT_OUT: [u32; 18] = [
     10_001, 10_002, 10_003, 10_004, 10_005, 10_006, 10_007, 10_008, 10_151, 42_000, 42_001, 50_001, 50_002, 50_003,
@@ -324,7 +324,8 @@ fn offset_of(id: u32, field: impl Fn(&mut FullMessage) -> Option<&mut u8>) -> Op
     Some(u8::try_from(at).expect("a payload has at most 255 bytes"))
 }
 
-/// `payload` as far as the full dialect accepts it; a byte that makes an enumeration unknown to it stays at its default.
+/// `payload` as far as the full dialect accepts it; a byte that makes an enumeration unknown to it stays at its
+/// default.
 fn acceptable_to_the_full_dialect(id: u32, payload: &[u8]) -> Vec<u8> {
     let mut accepted = vec![0; 255];
     let sample = FullMessage::default_message_from_id(id).expect("the full dialect holds it");

@@ -439,8 +439,8 @@ fn item_03_an_all_zero_payload_is_one_byte_long() {
     assert_eq!(only_frame(&bytes).payload(), [0]);
 }
 
-/// "When 285 arrives with 40, 44, 48, 49 or 53 payload bytes, it decodes; missing extension fields read 0; surplus bytes
-/// are ignored and still forwarded."
+/// "When 285 arrives with 40, 44, 48, 49 or 53 payload bytes, it decodes; missing extension fields read 0; surplus
+/// bytes are ignored and still forwarded."
 #[test]
 #[rustfmt::skip]
 fn item_04_attitude_status_of_any_age_is_decoded() {
@@ -482,8 +482,8 @@ fn item_04_attitude_status_of_any_age_is_decoded() {
     }
 }
 
-/// "When 283 arrives with 144 bytes, effective caps = cap_flags; with 149 bytes and cap_flags2 = 0x21FF7, effective caps
-/// = 0x21FF7." Here: an absent `cap_flags2` reads 0.
+/// "When 283 arrives with 144 bytes, effective caps = cap_flags; with 149 bytes and cap_flags2 = 0x21FF7, effective
+/// caps = 0x21FF7." Here: an absent `cap_flags2` reads 0.
 #[test]
 fn item_05_device_information_of_either_length_is_decoded() {
     let mut payload = [0u8; 149];

@@ -457,8 +457,8 @@ fn frames_between_noise() -> impl Strategy<Value = Vec<u8>> {
     })
 }
 
-/// The same without unknown messages and without signed frames that are broken off: with the start of the next frame for
-/// the rest of its signature, the crate's reader takes such a frame for a whole one.
+/// The same without unknown messages and without signed frames that are broken off: with the start of the next frame
+/// for the rest of its signature, the crate's reader takes such a frame for a whole one.
 fn known_frames_between_noise() -> impl Strategy<Value = Vec<u8>> {
     pieces(|random, sequence, len| match random.below(4) {
         0 => random.bytes_with_starts(len),
