@@ -1,0 +1,4 @@
+//! What more than one test needs.
+
+pub mod tlog;
+pub mod wire;
