@@ -7,6 +7,7 @@ pub mod endpoint;
 pub mod geometry;
 pub mod gimbals;
 pub mod manager;
+pub mod sim;
 pub mod timers;
 pub mod timestamp;
 pub mod wire;
