@@ -10,4 +10,5 @@ pub mod manager;
 pub mod sim;
 pub mod timers;
 pub mod timestamp;
+pub mod vehicle;
 pub mod wire;
