@@ -1,3 +1,4 @@
 //! Gimbals behind one driver trait, a folder per family.
 
+pub mod mavlink_v2;
 pub mod settings;

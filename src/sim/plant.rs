@@ -202,17 +202,14 @@ impl Plant {
     }
 
     pub fn set_roll(&mut self, drive: Drive) {
-        self.motors_on = true;
         self.roll.drive = drive;
     }
 
     pub fn set_pitch(&mut self, drive: Drive) {
-        self.motors_on = true;
         self.pitch.drive = drive;
     }
 
     pub fn set_yaw(&mut self, hold: YawHold, drive: Drive) {
-        self.motors_on = true;
         self.yaw_hold = hold;
         self.yaw.drive = drive;
     }
@@ -241,9 +238,17 @@ impl Plant {
         self.yaw.drive = Drive::To { angle, speed: None };
     }
 
-    /// Lets go: the camera sinks to where gravity pulls it, until a joint is driven again.
+    /// Lets go: the camera sinks to where gravity pulls it.
     pub fn release_motors(&mut self) {
         self.motors_on = false;
+    }
+
+    /// Takes hold again, wherever the camera has sunk to; without effect on motors that are on.
+    pub fn engage_motors(&mut self) {
+        if !self.motors_on {
+            self.motors_on = true;
+            self.hold();
+        }
     }
 
     pub fn yaw_hold(&self) -> YawHold {

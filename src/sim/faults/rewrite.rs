@@ -86,7 +86,7 @@ pub fn put_nan(bytes: &mut Vec<u8>, random: &mut Random) {
     }
 }
 
-fn spoil<const N: usize>(mut floats: [&mut f32; N], random: &mut Random) {
+fn spoil<const N: usize>(floats: [&mut f32; N], random: &mut Random) {
     *floats[random.below(N)] = f32::NAN;
 }
 

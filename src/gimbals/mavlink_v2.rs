@@ -1,0 +1,3 @@
+//! Gimbal devices that speak Gimbal Protocol v2.
+
+pub mod sim;
