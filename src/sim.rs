@@ -11,3 +11,4 @@ pub mod peer;
 pub mod plant;
 pub mod random;
 pub mod streams;
+pub mod vehicle;

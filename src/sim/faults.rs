@@ -42,9 +42,9 @@ use crate::timestamp::Timestamp;
 /// | `baud-mismatch=D@T` | for D every byte sent is a random one |
 /// | `reboot@T` | a start as after a power-on |
 /// | `clock-jump=D@T` | `time_boot_ms` jumps by D, backwards when D begins with `-` |
-/// | `seed=N` | another course of chance; 1 by default |
 #[derive(Clone, Debug, PartialEq)]
 pub struct Faults {
+    /// Decides the course of chance; it is not part of the text.
     pub seed: u64,
     pub drop: f64,
     pub deaf: f64,

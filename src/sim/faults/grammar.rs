@@ -7,15 +7,13 @@ use super::{ClockJump, Faults, Window};
 use crate::timestamp::Timestamp;
 
 const WORDS: &str = "drop, deaf, duplicate, reorder, delay, jitter, corrupt, truncate, garbage, split, merge, ack-loss, \
-                     ack-delay, ack-target, sequence-gap, nan, silence, power-cut, baud-mismatch, reboot, clock-jump, \
-                     seed";
+                     ack-delay, ack-target, sequence-gap, nan, silence, power-cut, baud-mismatch, reboot, clock-jump";
 
 const PROBABILITY: &str = "a probability from 0 to 1, for example 0.1";
 const DURATION: &str = "a duration, for example 250ms, 5s, 2min or 1h";
 const TIME: &str = "@ and a time since the start, for example @20s";
 const NOTHING: &str = "no time; this fault is always on";
 const NO_VALUE: &str = "no value, only a time, for example reboot@20s";
-const NUMBER: &str = "a whole number";
 
 /// Why a text names no faults.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -45,7 +43,6 @@ impl Faults {
     #[rustfmt::skip]
     fn read_entry(&mut self, entry: Entry<'_>) -> Result<(), FaultError> {
         match entry.word {
-            "seed" => self.seed = entry.number("seed")?,
             "drop" => self.drop = entry.probability("drop")?,
             "deaf" => self.deaf = entry.probability("deaf")?,
             "duplicate" => self.duplicate = entry.probability("duplicate")?,
@@ -103,12 +100,6 @@ impl<'a> Entry<'a> {
             None => Ok(()),
             Some(found) => Err(FaultError::Value { word, found: format!("@{found}"), expected: NOTHING }),
         }
-    }
-
-    fn number(self, word: &'static str) -> Result<u64, FaultError> {
-        self.without_time(word)?;
-        let text = self.value(word, NUMBER)?;
-        text.parse().map_err(|_| FaultError::Value { word, found: text.to_owned(), expected: NUMBER })
     }
 
     fn probability(self, word: &'static str) -> Result<f64, FaultError> {
@@ -186,14 +177,14 @@ mod tests {
 
     #[test]
     fn every_word_sets_its_fault() {
-        let text = "seed=7,drop=0.1,deaf=0.2,duplicate=0.3,reorder=0.4,delay=250ms,jitter=5ms,corrupt=0.5,\
+        let text = "drop=0.1,deaf=0.2,duplicate=0.3,reorder=0.4,delay=250ms,jitter=5ms,corrupt=0.5,\
                     truncate=0.6,garbage=0.7,split=0.8,merge=0.9,ack-loss=1,ack-delay=1s,ack-target=0.11,\
                     sequence-gap=0.12,nan=0.13,silence=5s@20s,power-cut=1min@1h,baud-mismatch=2s@0s,reboot@1.5s,\
                     clock-jump=-3s@4s";
         let window = |from, until| Window { from: Timestamp::from_secs(from), until: Timestamp::from_secs(until) };
 
         let expected = Faults {
-            seed: 7,
+            seed: 1,
             drop: 0.1,
             deaf: 0.2,
             duplicate: 0.3,
@@ -236,7 +227,6 @@ mod tests {
             ),
             ("reboot=1@5s", "fault \"reboot\": found \"1\", expected no value, only a time, for example reboot@20s"),
             ("reboot", "fault \"reboot\": expected @ and a time since the start, for example @20s"),
-            ("seed=x", "fault \"seed\": found \"x\", expected a whole number"),
         ] {
             assert_eq!(text.parse::<Faults>().map_err(|error| error.to_string()), Err(message.to_owned()), "{text}");
         }
