@@ -3,7 +3,12 @@
 //! `docs/architecture.md` tells how the parts fit together.
 
 pub mod bridge;
+pub mod cli;
+pub mod commands;
+pub mod config;
+pub mod daemon;
 pub mod endpoint;
+pub mod exit_code;
 pub mod geometry;
 pub mod gimbals;
 pub mod manager;

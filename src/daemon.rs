@@ -1,0 +1,3 @@
+//! The process around the core.
+
+pub mod logging;
