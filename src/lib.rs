@@ -16,6 +16,7 @@ pub mod http;
 pub mod links;
 pub mod manager;
 pub mod router;
+pub mod sim;
 pub mod timers;
 pub mod timestamp;
 pub mod vehicle;

@@ -2,5 +2,6 @@
 
 pub mod driver;
 pub mod packet;
+pub mod sim;
 
 pub use driver::MavlinkV2Driver;

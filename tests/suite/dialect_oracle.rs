@@ -30,7 +30,7 @@ fn the_table_holds_the_messages_of_the_full_dialect() {
     let full: BTreeSet<u32> = FullMessage::all_ids().iter().copied().collect();
 
     assert_eq!(full.difference(&ours).copied().collect::<Vec<_>>(), LEFT_OUT);
-    assert_eq!(ours.difference(&full).copied().collect::<Vec<_>>(), []);
+    assert_eq!(ours.difference(&full).collect::<Vec<_>>(), Vec::<&u32>::new());
 }
 
 #[test]

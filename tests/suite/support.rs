@@ -2,3 +2,4 @@
 
 pub mod tlog;
 pub mod wire;
+pub mod world;
