@@ -9,3 +9,4 @@ mod properties;
 mod shipped_files;
 mod structure;
 mod support;
+mod whole_path;
