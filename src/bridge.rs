@@ -300,8 +300,9 @@ impl Bridge {
         {
             self.outbox.push_system_id(system);
         }
-        // Our first frame under a new id is a heartbeat, everywhere.
-        self.timers.set(Timer::Heartbeat, now);
+        // Our first frame under a new id is a heartbeat, everywhere, and before the frame that settled it goes on: a
+        // gimbal takes the system id of the first heartbeat it hears.
+        self.handle_heartbeat_timer(now);
     }
 
     fn handle_heartbeat_timer(&mut self, now: Timestamp) {
