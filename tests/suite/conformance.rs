@@ -1,3 +1,4 @@
 //! The protocol checklist, item by item; the number of an item is in the name of its test.
 
 mod codec;
+mod identity;
