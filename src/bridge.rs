@@ -220,9 +220,7 @@ impl Bridge {
         }
         self.router.close_channel(channel);
         self.router.open_channel(channel);
-        for gimbal in self.roster.iter_mut() {
-            gimbal.manager.open_channel(now, channel);
-        }
+        self.roster.open_channel(now, channel);
         // A gimbal takes the system id of the first heartbeat it hears, so ours is the first there.
         if self.channels.role(channel) == Some(Role::Gimbal) && self.identity.system().is_some() {
             self.beat(now, channel.into());
@@ -232,9 +230,7 @@ impl Bridge {
     fn close_channel(&mut self, channel: ChannelId) {
         self.channels.close(channel);
         self.router.close_channel(channel);
-        for gimbal in self.roster.iter_mut() {
-            gimbal.manager.close_channel(channel);
-        }
+        self.roster.close_channel(channel);
     }
 
     fn handle_received(&mut self, now: Timestamp, channel: ChannelId, bytes: &[u8]) {
