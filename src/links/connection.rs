@@ -28,6 +28,8 @@ const READS: usize = 4;
 pub struct Connection {
     stream: TcpStream,
     output: FrameQueue,
+    /// Whether room for more output will wake the event loop.
+    waits_for_room: bool,
     failure: Option<io::Error>,
 }
 
@@ -43,7 +45,7 @@ impl Connection {
             .with_interval(Duration::from_secs(5))
             .with_retries(3);
         socket.set_tcp_keepalive(&probes)?;
-        Ok(Self { stream, output: FrameQueue::new(OUTPUT_LIMIT), failure: None })
+        Ok(Self { stream, output: FrameQueue::new(OUTPUT_LIMIT), waits_for_room: false, failure: None })
     }
 
     pub fn address(&self) -> io::Result<SocketAddr> {
@@ -81,7 +83,10 @@ impl Connection {
     fn poll_output(&mut self, now: Timestamp, cx: &mut Context<'_>) {
         while !self.output.is_empty() && self.failure.is_none() {
             match self.stream.poll_write_ready(cx) {
-                Poll::Pending => break,
+                Poll::Pending => {
+                    self.waits_for_room = true;
+                    break;
+                }
                 Poll::Ready(Ok(())) => self.flush(now),
                 Poll::Ready(Err(error)) => self.failure = Some(error),
             }
@@ -92,10 +97,11 @@ impl Connection {
     }
 
     pub fn poll_timeout(&self) -> Option<Timestamp> {
-        match &self.failure {
-            Some(_) => Some(Timestamp::ZERO),
-            None => self.output.stalled_since().map(|since| since + STALL_LIMIT),
+        let stalled_since = self.output.stalled_since();
+        if self.failure.is_some() || stalled_since.is_some() && !self.waits_for_room {
+            return Some(Timestamp::ZERO);
         }
+        stalled_since.map(|since| since + STALL_LIMIT)
     }
 
     pub fn send(&mut self, peer: PeerIndex, frame: &[u8], failures: &mut SendFailures) {
@@ -105,6 +111,7 @@ impl Connection {
     }
 
     pub fn flush(&mut self, now: Timestamp) {
+        self.waits_for_room = false;
         if !self.output.is_empty()
             && let Err(error) = self.output.write(now, |bytes| self.stream.try_write(bytes))
         {

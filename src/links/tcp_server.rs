@@ -269,6 +269,8 @@ mod tests {
         while !rig.link.has_unsent() {
             rig.send(0, &frame(1));
         }
+        assert_eq!(rig.link.poll_timeout(), Some(Timestamp::ZERO), "to be polled, so that room will wake it");
+        rig.expect_silence();
         assert_eq!(rig.link.poll_timeout(), Some(rig.now + Duration::from_secs(10)));
         rig.pass(Duration::from_secs(9));
         rig.expect_silence();
