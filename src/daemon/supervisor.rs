@@ -4,7 +4,6 @@ use std::future::poll_fn;
 use std::io;
 use std::sync::Arc;
 use std::thread;
-use std::time::Duration;
 
 use tokio::sync::{mpsc, watch};
 
@@ -20,8 +19,6 @@ use crate::links;
 
 /// Requests that may wait; whoever asks for more waits.
 const REQUESTS: usize = 16;
-/// How long a file that is being written may hold up the end.
-const FILE_PATIENCE: Duration = Duration::from_millis(200);
 
 /// Why the daemon could not start, or not go on.
 #[derive(Debug, thiserror::Error)]
@@ -45,12 +42,10 @@ pub fn run(
     serve_http: impl FnOnce(HttpSettings, CoreHandle) + Send + 'static,
 ) -> Result<(), RunError> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_io().build().map_err(RunError::Runtime)?;
-    let result = runtime.block_on(async {
+    runtime.block_on(async {
         let mut event_loop = assemble(settings, serve_http)?;
         poll_fn(|cx| event_loop.poll(cx)).await.map_err(RunError::Timer)
-    });
-    runtime.shutdown_timeout(FILE_PATIENCE);
-    result
+    })
 }
 
 fn assemble(

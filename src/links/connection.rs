@@ -12,7 +12,7 @@ use tokio::net::TcpStream;
 
 use super::Progress;
 use super::frame_queue::FrameQueue;
-use super::inbox::{Inbox, PeerIndex};
+use super::inbox::{self, Inbox, PeerIndex};
 use super::send_failures::SendFailures;
 use crate::timestamp::Timestamp;
 
@@ -22,8 +22,8 @@ const OUTPUT_LIMIT: usize = 64 * 1024;
 const KERNEL_BUFFER: usize = 64 * 1024;
 /// A peer that takes nothing for so long is closed.
 const STALL_LIMIT: Duration = Duration::from_secs(10);
-/// Reads of one connection in one batch.
-const READS: usize = 4;
+/// Reads of one connection in one batch: as many as leave the same for all others.
+const READS: usize = inbox::READS / inbox::PEERS;
 
 pub struct Connection {
     stream: TcpStream,
