@@ -281,6 +281,10 @@ mod tests {
             rig.send(0, &frame(1));
         }
         assert_eq!(rig.link.poll_timeout(), Some(Timestamp::ZERO), "to be polled, so that room will wake it");
+        // The kernel finds more room for a while; what counts is that it has none in the end.
+        while rig.poll_once().is_none() {
+            rig.send(0, &frame(1));
+        }
         rig.expect_silence();
         assert_eq!(rig.link.poll_timeout(), Some(rig.now + Duration::from_secs(10)));
         rig.pass(Duration::from_secs(9));
