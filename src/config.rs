@@ -1,3 +1,80 @@
-//! What the operator said, checked.
+//! The operator's settings: one TOML file, overridden by `GIMBALD__` environment variables.
+//!
+//! The file is read into values that know where they stand (`document.rs`), variables are laid over it
+//! (`environment.rs`), each value is checked for itself (`schema.rs`), then all of them together (`checks.rs`). Whatever
+//! is wrong is collected on the way, so that everything is reported at once.
 
+mod checks;
+mod document;
+mod environment;
+mod numbering;
+pub mod problem;
+mod reader;
+pub mod schema;
 pub mod settings;
+mod suggestion;
+
+use std::path::{Path, PathBuf};
+use std::{fs, io};
+
+use problem::{Place, Problem, Problems};
+use settings::DaemonSettings;
+
+/// Where the configuration is looked for when the command line names no other file.
+pub const DEFAULT_FILE: &str = "/etc/gimbald/gimbald.toml";
+
+/// Reads the file at `path`, lays the `GIMBALD__` variables of `environment` over it, and checks the whole.
+///
+/// `STATE_DIRECTORY`, as systemd sets it, names the state directory. Other variables are ignored.
+pub fn load(path: &Path, environment: impl Iterator<Item = (String, String)>) -> Result<DaemonSettings, Problems> {
+    let in_file = |list| Problems::new(path.to_owned(), list);
+    let text = fs::read(path).map_err(|error| in_file(vec![unreadable(&error)]))?;
+    let text = String::from_utf8(text).map_err(|error| in_file(vec![not_utf8(&error)]))?;
+    let mut root = document::parse(&text).map_err(|problem| in_file(vec![problem]))?;
+
+    let mut problems = Vec::new();
+    let mut state_directory = None;
+    let mut overrides = Vec::new();
+    for (name, value) in environment {
+        if name == "STATE_DIRECTORY" {
+            state_directory = first_directory(&value);
+        } else if name.starts_with(environment::PREFIX) {
+            overrides.push((name, value));
+        }
+    }
+    overrides.sort();
+    environment::apply(&mut root, overrides, &mut problems);
+
+    let configuration = schema::read(root, &mut problems);
+    checks::check(&configuration, &mut problems);
+    if problems.is_empty() { Ok(settings::build(configuration, state_directory)) } else { Err(in_file(problems)) }
+}
+
+/// The variables of this process; bytes that are no UTF-8 become U+FFFD, which no setting accepts.
+pub fn process_environment() -> impl Iterator<Item = (String, String)> {
+    std::env::vars_os().map(|(name, value)| (name.to_string_lossy().into_owned(), value.to_string_lossy().into_owned()))
+}
+
+/// `$STATE_DIRECTORY` holds the paths of all state directories with colons between them; ours is the first.
+fn first_directory(value: &str) -> Option<PathBuf> {
+    value.split(':').next().filter(|path| !path.is_empty()).map(PathBuf::from)
+}
+
+fn unreadable(error: &io::Error) -> Problem {
+    let found = match error.kind() {
+        io::ErrorKind::NotFound => "no such file".to_owned(),
+        _ => format!("cannot be read: {error}"),
+    };
+    Problem { place: Place::File, key: String::new(), found, expected: "a readable TOML file".to_owned() }
+}
+
+fn not_utf8(error: &std::string::FromUtf8Error) -> Problem {
+    let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+    let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
+    Problem {
+        place: Place::Line(line),
+        key: String::new(),
+        found: "a byte that is not UTF-8".to_owned(),
+        expected: "a TOML file in UTF-8".to_owned(),
+    }
+}

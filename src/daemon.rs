@@ -1,8 +1,10 @@
-//! Runs the core: clock, links, state file, service manager, and the window that others see it through.
+//! The process around the core: clock, links, log, state file, service manager, and the window that others see it
+//! through.
 
 mod channels;
 mod clock;
 mod event_loop;
+pub mod logging;
 mod shutdown;
 pub mod supervisor;
 mod system_id_file;

@@ -4,14 +4,20 @@
 
 pub mod bridge;
 pub mod channel;
+pub mod cli;
+pub mod commands;
 pub mod config;
 pub mod daemon;
 pub mod endpoint;
+pub mod exit_code;
 pub mod geometry;
 pub mod gimbals;
+pub mod http;
 pub mod links;
 pub mod manager;
 pub mod router;
+pub mod sim;
 pub mod timers;
 pub mod timestamp;
+pub mod vehicle;
 pub mod wire;

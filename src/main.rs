@@ -1,1 +1,27 @@
-fn main() {}
+use std::env;
+use std::io::{self, Write};
+use std::process;
+
+use gimbald::cli::{Cli, Command};
+use gimbald::commands;
+use gimbald::daemon::logging;
+use gimbald::exit_code::ExitCode;
+
+fn main() -> process::ExitCode {
+    let cli = match Cli::read(env::args_os()) {
+        Ok(cli) => cli,
+        Err(code) => return code.into(),
+    };
+    let _logging = logging::start(&cli.log);
+    match cli.command {
+        Command::Check(arguments) => commands::check::check(&arguments, &mut io::stdout(), &mut io::stderr()),
+        Command::Run(arguments) => commands::run::run(&arguments, &mut io::stderr()),
+        Command::Status(arguments) => commands::status::status(&arguments, &mut io::stderr()),
+        Command::Demo(_) | Command::Sim(_) | Command::Scan(_) => {
+            // The exit code says it too; nobody is left to tell when the reader is gone.
+            let _ = writeln!(io::stderr(), "gimbald: built without this command");
+            ExitCode::Unavailable
+        }
+    }
+    .into()
+}

@@ -1,27 +1,119 @@
-//! The configuration after it was checked, as the daemon uses it.
+//! The checked configuration, as the daemon takes it.
 
-use std::net::SocketAddr;
+use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 
-use crate::bridge;
+use crate::bridge::settings::{LinkSettings, Settings, Transport};
 use crate::endpoint::Endpoint;
+use crate::gimbals::settings::GimbalSettings;
+use crate::manager::settings::ControlSettings;
 
-/// Everything that a running daemon is told before it starts.
+use super::reader::Located;
+use super::schema::{Configuration, Control, Gimbal, Http, Link, Roi};
+
+/// Everything that `gimbald run` must be told.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DaemonSettings {
-    pub core: bridge::settings::Settings,
-    /// In the order of the core's links.
+    pub core: Settings,
+    /// One for each link of `core`, in the same order.
     pub endpoints: Vec<Endpoint>,
-    /// No page and no status without it.
     pub http: Option<HttpSettings>,
-    /// Where the adopted system id is kept.
+    /// Where the adopted system id is kept; nowhere when unset.
     pub state_directory: Option<PathBuf>,
 }
 
-/// The `[http]` part.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct HttpSettings {
     pub listen: SocketAddr,
-    /// Holds the token that permits control; without it the window is read-only.
+    /// Holds the bearer token that allows control; without it HTTP is read-only.
     pub token_file: Option<PathBuf>,
+}
+
+impl HttpSettings {
+    /// Where the page is when the configuration does not say.
+    pub const DEFAULT_LISTEN: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 8080);
+}
+
+/// Turns a configuration without problems into settings; unset keys get their defaults here.
+pub(super) fn build(configuration: Configuration, state_directory: Option<PathBuf>) -> DaemonSettings {
+    let Configuration { vehicle, links, gimbals, control, roi, http } = configuration;
+    let (links, endpoints): (Vec<LinkSettings>, Vec<Endpoint>) = links.into_iter().map(link).unzip();
+    let gimbals = gimbals.into_iter().map(|entry| gimbal(entry, &links)).collect();
+    DaemonSettings {
+        core: Settings {
+            system_id: value_or(vehicle.system_id, Settings::default().system_id),
+            stored_system_id: None,
+            links,
+            gimbals,
+            control: self::control(control, roi),
+        },
+        endpoints,
+        http: Some(self::http(http)),
+        state_directory,
+    }
+}
+
+fn value_or<T>(located: Option<Located<T>>, default: T) -> T {
+    located.map_or(default, |located| located.value)
+}
+
+fn required<T>(located: Option<Located<T>>) -> T {
+    located.expect("a missing required key is a problem, and settings are built when there is none").value
+}
+
+fn link(link: Link) -> (LinkSettings, Endpoint) {
+    let endpoint = required(link.endpoint);
+    let (transport, speaks_first) = match endpoint {
+        Endpoint::Serial { baud, .. } => (Transport::Serial { baud }, false),
+        Endpoint::UdpIn(_) => (Transport::Datagrams, false),
+        Endpoint::UdpOut(_) | Endpoint::UdpBroadcast(_) => (Transport::Datagrams, true),
+        Endpoint::TcpIn(_) => (Transport::Stream, false),
+        Endpoint::TcpOut(_) => (Transport::Stream, true),
+    };
+    let settings = LinkSettings {
+        name: required(link.name),
+        role: required(link.role),
+        endpoint: endpoint.to_string(),
+        transport,
+        speaks_first,
+        max_rates: link.max_rates.into_iter().collect(),
+    };
+    (settings, endpoint)
+}
+
+fn gimbal(gimbal: Gimbal, links: &[LinkSettings]) -> GimbalSettings {
+    let default = GimbalSettings::found(required(gimbal.name));
+    GimbalSettings {
+        family: value_or(gimbal.family, default.family),
+        link: gimbal.link.and_then(|wanted| links.iter().position(|link| link.name == wanted.value)),
+        component_id: gimbal.component_id.map(|id| id.value),
+        manager_component_id: gimbal.manager_component_id.map(|id| id.value),
+        takeover: value_or(gimbal.takeover, default.takeover),
+        setpoint_rate_hz: value_or(gimbal.setpoint_rate_hz, default.setpoint_rate_hz),
+        device_yaw_frame: value_or(gimbal.device_yaw_frame, default.device_yaw_frame),
+        manual_pitch_rate_dps: value_or(gimbal.manual_pitch_rate_dps, default.manual_pitch_rate_dps),
+        manual_yaw_rate_dps: value_or(gimbal.manual_yaw_rate_dps, default.manual_yaw_rate_dps),
+        name: default.name,
+    }
+}
+
+fn control(control: Control, roi: Roi) -> ControlSettings {
+    let default = ControlSettings::default();
+    ControlSettings {
+        open_when_unclaimed: value_or(control.open_when_unclaimed, default.open_when_unclaimed),
+        lease_timeout: value_or(control.lease_timeout, default.lease_timeout),
+        rate_timeout: value_or(control.rate_timeout, default.rate_timeout),
+        command_rate_timeout: value_or(control.command_rate_timeout, default.command_rate_timeout),
+        firewall: value_or(control.firewall, default.firewall),
+        snoop_autopilot: value_or(control.snoop_autopilot, default.snoop_autopilot),
+        px4_release_quirk: value_or(control.px4_release_quirk, default.px4_release_quirk),
+        roi_altitude: value_or(roi.altitude_reference, default.roi_altitude),
+    }
+}
+
+fn http(http: Http) -> HttpSettings {
+    HttpSettings {
+        listen: value_or(http.listen, HttpSettings::DEFAULT_LISTEN),
+        token_file: http.token_file.map(|file| file.value),
+    }
 }

@@ -1,0 +1,320 @@
+//! The command line: every command with its arguments and its help.
+
+use std::ffi::OsString;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::config::{DEFAULT_FILE, settings::HttpSettings};
+use crate::daemon::logging::LogFilter;
+use crate::endpoint::Endpoint;
+use crate::exit_code::ExitCode;
+
+const ENDPOINTS: &str = "\
+Endpoints:
+  serial:PATH:BAUD      a serial port, for example serial:/dev/ttyUSB0:115200
+  udpin:ADDR:PORT       wait for datagrams and answer whoever sends them
+  udpout:ADDR:PORT      send datagrams to one peer, speaking first
+  udpbcast:ADDR:PORT    to a broadcast address until somebody answers
+  tcpin:ADDR:PORT       wait for connections
+  tcpout:ADDR:PORT      connect, and again when the connection is lost
+";
+
+/// MAVLink router and gimbal manager for one vehicle's companion computer.
+#[derive(Debug, Parser)]
+#[command(
+    name = "gimbald",
+    version,
+    about = "MAVLink router and gimbal manager for a companion computer",
+    after_help = "\
+Examples:
+  gimbald demo                                   try everything without hardware
+  gimbald scan                                   find the gimbal on the serial ports
+  gimbald check --config ./gimbald.toml          is the configuration right?
+  gimbald run --config ./gimbald.toml --log debug
+  gimbald status --watch                         what is the running daemon doing?
+
+Exit codes: 0 done, 64 wrong arguments, 69 something needed is not there, 78 wrong configuration."
+)]
+pub struct Cli {
+    /// What to log: error, warn, info, debug, trace, or by module as in 'info,gimbald::links=debug'
+    #[arg(long, global = true, value_name = "FILTER", default_value = "info")]
+    pub log: LogFilter,
+
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run the service: route MAVLink between the configured links and manage their gimbals
+    #[command(after_help = "\
+Examples:
+  gimbald run
+  gimbald run --config ./gimbald.toml --log debug
+  GIMBALD__LINK__GROUND__ENDPOINT=udpout:10.0.0.2:14550 gimbald run
+
+Environment variables named GIMBALD__… override single values of the file. SIGTERM ends the service.")]
+    Run(ConfigArgs),
+
+    /// Say whether the configuration is right, and if not, everything that is wrong with it
+    #[command(after_help = "\
+Examples:
+  gimbald check
+  gimbald check --config ./gimbald.toml
+
+Prints a line for each problem: file, line, key, what was found, what is expected. Opens no port.
+Exit codes: 0 when all is right, 78 when not.")]
+    Check(ConfigArgs),
+
+    /// Show the whole system without hardware: simulated vehicle and gimbal, real daemon between them
+    #[command(after_help = format!("\
+Examples:
+  gimbald demo                                   then open http://127.0.0.1:8080 and QGroundControl
+  gimbald demo --ground udpbcast:192.168.1.255:14550
+  gimbald demo --duration 10
+
+{ENDPOINTS}"))]
+    Demo(DemoArgs),
+
+    /// Run one simulated peer
+    #[command(subcommand, arg_required_else_help = true)]
+    Sim(SimCommand),
+
+    /// Ask a running daemon how it is, and print it for a person
+    #[command(after_help = "\
+Examples:
+  gimbald status
+  gimbald status --watch
+  gimbald status --url http://192.168.1.10:8080 --json
+
+Exit codes: 0 when the daemon answered, 69 when not.")]
+    Status(StatusArgs),
+
+    /// Find out which serial device, baud rate and gimbal family answer
+    #[command(after_help = "\
+Examples:
+  gimbald scan                                   every serial device
+  gimbald scan /dev/ttyUSB0
+
+A port that a running 'gimbald run' holds is left alone.
+Exit codes: 0 when something answered, 69 when not.")]
+    Scan(ScanArgs),
+}
+
+#[derive(Debug, Args)]
+pub struct ConfigArgs {
+    /// The configuration file
+    #[arg(long, value_name = "FILE", default_value = DEFAULT_FILE)]
+    pub config: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub struct DemoArgs {
+    /// Where the ground station listens
+    #[arg(long, value_name = "ENDPOINT", default_value = "udpout:127.0.0.1:14550")]
+    pub ground: Endpoint,
+
+    /// Where to show the page
+    #[arg(long, value_name = "ADDR:PORT", default_value_t = HttpSettings::DEFAULT_LISTEN)]
+    pub http: SocketAddr,
+
+    /// What kind of gimbal to simulate
+    #[arg(long, value_name = "FAMILY", value_enum, default_value_t = SimulatedFamily::MavlinkV2)]
+    pub family: SimulatedFamily,
+
+    /// End after so many seconds; without it, at Ctrl-C
+    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(1..))]
+    pub duration: Option<u32>,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum SimCommand {
+    /// A simulated gimbal on an endpoint
+    #[command(after_help = format!("\
+Examples:
+  gimbald sim gimbal --endpoint udpout:127.0.0.1:14541
+  gimbald sim gimbal --endpoint serial:/dev/ttyUSB1:115200 --component-id 171
+  gimbald sim gimbal --endpoint tcpin:0.0.0.0:5790 --fault drop=0.1 --fault reboot@20s --seed 7
+
+{ENDPOINTS}"))]
+    Gimbal(SimGimbalArgs),
+
+    /// A simulated autopilot on an endpoint
+    #[command(after_help = format!("\
+Examples:
+  gimbald sim vehicle --endpoint udpout:127.0.0.1:14540
+  gimbald sim vehicle --endpoint udpout:127.0.0.1:14540 --autopilot ardupilot --system-id 3
+
+{ENDPOINTS}"))]
+    Vehicle(SimVehicleArgs),
+}
+
+#[derive(Debug, Args)]
+pub struct SimGimbalArgs {
+    /// The other end of the gimbal's cable
+    #[arg(long, value_name = "ENDPOINT")]
+    pub endpoint: Endpoint,
+
+    /// What kind of gimbal to simulate
+    #[arg(long, value_name = "FAMILY", value_enum, default_value_t = SimulatedFamily::MavlinkV2)]
+    pub family: SimulatedFamily,
+
+    /// The gimbal's MAVLink component id
+    #[arg(long, value_name = "N", default_value_t = 154, value_parser = clap::value_parser!(u8).range(1..))]
+    pub component_id: u8,
+
+    /// The gimbal's MAVLink system id
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
+    pub system_id: u8,
+
+    /// Something that goes wrong, such as drop=0.1 or reboot@20s; may be given several times
+    #[arg(long = "fault", value_name = "FAULT")]
+    pub faults: Vec<String>,
+
+    /// Start of the random numbers behind faults; the same seed gives the same run
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+
+    /// How the gimbal reads the yaw of a setpoint
+    #[arg(long, value_name = "FRAMES", value_enum, default_value_t = SimulatedFrames::Strict)]
+    pub frames: SimulatedFrames,
+}
+
+#[derive(Debug, Args)]
+pub struct SimVehicleArgs {
+    /// The other end of the autopilot's telemetry port
+    #[arg(long, value_name = "ENDPOINT")]
+    pub endpoint: Endpoint,
+
+    /// Whose habits to imitate
+    #[arg(long, value_name = "AUTOPILOT", value_enum, default_value_t = SimulatedAutopilot::Px4)]
+    pub autopilot: SimulatedAutopilot,
+
+    /// The vehicle's MAVLink system id
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
+    pub system_id: u8,
+
+    /// Do not send AUTOPILOT_STATE_FOR_GIMBAL_DEVICE, and refuse requests for it
+    #[arg(long)]
+    pub no_autopilot_state: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct StatusArgs {
+    /// Where the daemon's page is
+    #[arg(long, value_name = "URL", default_value_t = format!("http://{}", HttpSettings::DEFAULT_LISTEN))]
+    pub url: String,
+
+    /// Print again whenever something changes, until Ctrl-C
+    #[arg(long)]
+    pub watch: bool,
+
+    /// Print the daemon's JSON as it is
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct ScanArgs {
+    /// The serial device to try; every one when it is left out
+    #[arg(value_name = "DEVICE")]
+    pub device: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SimulatedFamily {
+    /// A gimbal device of the MAVLink Gimbal Protocol v2
+    #[value(name = "mavlink_v2")]
+    MavlinkV2,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SimulatedFrames {
+    /// Knows YAW_LOCK only, not the frame flags
+    Legacy,
+    /// Takes exactly what the frame flags say
+    Strict,
+    /// Takes yaw in the vehicle frame only
+    VehicleOnly,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SimulatedAutopilot {
+    Px4,
+    #[value(name = "ardupilot")]
+    ArduPilot,
+}
+
+impl Cli {
+    /// Reads the arguments of a process. When there is nothing to run (help was asked for, or the arguments are
+    /// wrong), prints what there is to say and gives the code to end with.
+    pub fn read(arguments: impl IntoIterator<Item = OsString>) -> Result<Self, ExitCode> {
+        Self::try_parse_from(arguments).map_err(|error| {
+            let code = if error.use_stderr() { ExitCode::Usage } else { ExitCode::Ok };
+            // Nobody is left to tell when the terminal is gone.
+            let _ = error.print();
+            code
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    fn read(line: &str) -> Result<Cli, ExitCode> {
+        Cli::read(line.split(' ').map(OsString::from))
+    }
+
+    /// Clap finds clashing names, impossible defaults and the like.
+    #[test]
+    fn the_arguments_are_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    /// "Exit codes follow sysexits: 0, also for `--help` and `--version`; 64 usage".
+    #[test]
+    fn help_is_a_success_and_wrong_arguments_are_usage_errors() {
+        for (line, code) in [
+            ("gimbald --help", ExitCode::Ok),
+            ("gimbald --version", ExitCode::Ok),
+            ("gimbald help run", ExitCode::Ok),
+            ("gimbald sim gimbal --help", ExitCode::Ok),
+            ("gimbald", ExitCode::Usage),
+            ("gimbald sim", ExitCode::Usage),
+            ("gimbald fly", ExitCode::Usage),
+            ("gimbald run --confg x", ExitCode::Usage),
+            ("gimbald run --log a=b=c", ExitCode::Usage),
+            ("gimbald sim gimbal", ExitCode::Usage),
+            ("gimbald sim gimbal --endpoint /dev/ttyUSB0", ExitCode::Usage),
+            ("gimbald sim vehicle --endpoint udpin:127.0.0.1:1 --system-id 0", ExitCode::Usage),
+            ("gimbald demo --duration 0", ExitCode::Usage),
+        ] {
+            assert_eq!(read(line).map(|_| ()), Err(code), "{line}");
+        }
+    }
+
+    #[test]
+    fn defaults_are_the_documented_ones() {
+        let Ok(Cli { log, command: Command::Run(run) }) = read("gimbald run") else { panic!("run") };
+        assert_eq!((log.to_string().as_str(), run.config), ("info", PathBuf::from("/etc/gimbald/gimbald.toml")));
+
+        let Ok(Cli { command: Command::Demo(demo), .. }) = read("gimbald demo") else { panic!("demo") };
+        assert_eq!(demo.ground.to_string(), "udpout:127.0.0.1:14550");
+        assert_eq!(demo.http.to_string(), "127.0.0.1:8080");
+        assert_eq!(demo.duration, None);
+
+        let Ok(Cli { command: Command::Status(status), .. }) = read("gimbald status") else { panic!("status") };
+        assert_eq!(status.url, "http://127.0.0.1:8080");
+    }
+
+    #[test]
+    fn the_log_filter_may_stand_anywhere() {
+        for line in ["gimbald --log debug scan", "gimbald scan --log debug", "gimbald scan /dev/ttyS0 --log=debug"] {
+            assert_eq!(read(line).expect(line).log.to_string(), "debug", "{line}");
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! What is wrong only together: names, references, ports, files.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::net::{IpAddr, SocketAddr};
+use std::os::unix::fs::PermissionsExt;
+use std::path::PathBuf;
+
+use crate::endpoint::Endpoint;
+
+use super::environment::spelling;
+use super::numbering;
+use super::problem::{Place, Problem};
+use super::reader::Located;
+use super::schema::{Configuration, Http, Link};
+use super::settings::HttpSettings;
+use super::suggestion;
+
+pub(super) fn check(configuration: &Configuration, problems: &mut Vec<Problem>) {
+    let Configuration { links, gimbals, http, .. } = configuration;
+    // A link section of the wrong kind has been reported.
+    if links.is_empty() && !problems.iter().any(|problem| problem.key == "link") {
+        problems.push(Problem {
+            place: Place::File,
+            key: "link".to_owned(),
+            found: "missing".to_owned(),
+            expected: "at least one [[link]] with name, role and endpoint".to_owned(),
+        });
+    }
+    check_names(links.iter().filter_map(|link| link.name.as_ref()), problems);
+    check_names(gimbals.iter().filter_map(|gimbal| gimbal.name.as_ref()), problems);
+    let names: Vec<&str> = links.iter().filter_map(|link| link.name.as_ref()).map(|name| name.value.as_str()).collect();
+    for link in gimbals.iter().filter_map(|gimbal| gimbal.link.as_ref()) {
+        if !names.contains(&link.value.as_str()) {
+            let hint = suggestion::hint(&link.value, names.iter().copied());
+            let expected = format!("the name of a link, one of {}{hint}", names.join(", "));
+            problems.push(link.problem(format!("found {}", link.shown), expected));
+        }
+    }
+    numbering::check(gimbals, problems);
+    check_endpoints(links, http, problems);
+    check_token_file(http, problems);
+}
+
+/// Names differ in more than a variable can tell.
+fn check_names<'a>(names: impl Iterator<Item = &'a Located<String>>, problems: &mut Vec<Problem>) {
+    let mut first: BTreeMap<String, &Located<String>> = BTreeMap::new();
+    for name in names {
+        match first.get(&spelling(&name.value)) {
+            Some(earlier) => problems.push(name.problem(
+                format!("found {}, the name in {}", name.shown, place(&earlier.place)),
+                "a name that differs from all others in more than case and - or _",
+            )),
+            None => {
+                first.insert(spelling(&name.value), name);
+            }
+        }
+    }
+}
+
+fn check_endpoints(links: &[Link], http: &Http, problems: &mut Vec<Problem>) {
+    let endpoints: Vec<&Located<Endpoint>> = links.iter().filter_map(|link| link.endpoint.as_ref()).collect();
+    for (position, endpoint) in endpoints.iter().enumerate() {
+        if let Some(earlier) = endpoints[..position].iter().find(|earlier| collide(&earlier.value, &endpoint.value)) {
+            let (what, expected) = match endpoint.value {
+                Endpoint::Serial { .. } => ("serial port", "a serial port of its own"),
+                Endpoint::UdpIn(_) | Endpoint::TcpIn(_) => ("port", "a port of its own"),
+                Endpoint::UdpOut(_) | Endpoint::UdpBroadcast(_) | Endpoint::TcpOut(_) => ("peer", "a peer of its own"),
+            };
+            let found = format!("found {}, the {what} of the link in {}", endpoint.shown, place(&earlier.place));
+            problems.push(endpoint.problem(found, expected));
+        }
+    }
+    let listen = http.listen.as_ref().map_or(HttpSettings::DEFAULT_LISTEN, |listen| listen.value);
+    for endpoint in endpoints {
+        if let Endpoint::TcpIn(address) = endpoint.value
+            && same_port(address, listen)
+        {
+            let found = format!("found {}, the port of http.listen", endpoint.shown);
+            problems.push(endpoint.problem(found, "a port of its own"));
+        }
+    }
+}
+
+/// Two links cannot both work.
+fn collide(a: &Endpoint, b: &Endpoint) -> bool {
+    match (a, b) {
+        (Endpoint::Serial { path: a, .. }, Endpoint::Serial { path: b, .. }) => device(a) == device(b),
+        (Endpoint::UdpIn(a), Endpoint::UdpIn(b)) | (Endpoint::TcpIn(a), Endpoint::TcpIn(b)) => same_port(*a, *b),
+        (a, b) => a == b,
+    }
+}
+
+/// The device itself where it is there; `/dev/serial0` and the like are links to others.
+fn device(path: &str) -> PathBuf {
+    // A device that is not there yet keeps its name.
+    fs::canonicalize(path).unwrap_or_else(|_| PathBuf::from(path))
+}
+
+/// Both cannot be bound; port 0 stands for any free port.
+fn same_port(a: SocketAddr, b: SocketAddr) -> bool {
+    let any = |address: IpAddr| address.is_unspecified();
+    a.port() == b.port() && a.port() != 0 && (a.ip() == b.ip() || any(a.ip()) || any(b.ip()))
+}
+
+/// Whoever can read the token can steer the gimbal.
+fn check_token_file(http: &Http, problems: &mut Vec<Problem>) {
+    const EXPECTED: &str = "a file that only its owner can read: chmod 0600";
+    let Some(file) = &http.token_file else { return };
+    // A token that is not there yet locks everybody out, which is safe.
+    let Ok(metadata) = fs::metadata(&file.value) else { return };
+    let mode = metadata.permissions().mode() & 0o7777;
+    if !metadata.is_file() {
+        problems.push(file.problem(format!("found {}, which is no file", file.shown), EXPECTED));
+    } else if mode & 0o077 != 0 {
+        problems.push(file.problem(format!("found {}, which has mode {mode:04o}", file.shown), EXPECTED));
+    }
+}
+
+fn place(place: &Place) -> String {
+    match place {
+        Place::File => "the file".to_owned(),
+        Place::Line(line) => format!("line {line}"),
+        Place::Variable(name) => name.clone(),
+    }
+}

@@ -1,0 +1,86 @@
+//! A TOML file as values that know the line they stand on.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::problem::{Place, Problem};
+
+/// Keys and values, by key.
+pub(super) type Table = BTreeMap<String, Value>;
+
+#[derive(Clone, Debug)]
+pub(super) struct Value {
+    /// Of a table or array, its header.
+    pub place: Place,
+    pub raw: Raw,
+}
+
+#[derive(Clone, Debug)]
+pub(super) enum Raw {
+    Text(String),
+    Integer(i64),
+    /// An integer that does not fit 64 bits, as written.
+    HugeInteger(String),
+    Float(f64),
+    Flag(bool),
+    Date,
+    Array(Vec<Value>),
+    Table(Table),
+    /// Text of an environment variable; may stand for any scalar.
+    Variable(String),
+}
+
+/// As it is shown to the operator.
+impl fmt::Display for Raw {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Text(text) | Self::Variable(text) => write!(f, "{text:?}"),
+            Self::Integer(value) => write!(f, "{value}"),
+            Self::HugeInteger(digits) => write!(f, "{digits}"),
+            Self::Float(value) => write!(f, "{value:?}"),
+            Self::Flag(value) => write!(f, "{value}"),
+            Self::Date => write!(f, "a date"),
+            Self::Array(_) => write!(f, "an array"),
+            Self::Table(_) => write!(f, "a table"),
+        }
+    }
+}
+
+/// The file's top level. A file that is no TOML has this one problem.
+pub(super) fn parse(text: &str) -> Result<Table, Problem> {
+    let root = DeTable::parse(text).map_err(|error| Problem {
+        place: error.span().map_or(Place::File, |span| Place::Line(line_of(text, span.start))),
+        key: String::new(),
+        found: "not TOML".to_owned(),
+        expected: format!("a TOML file, but: {}", error.message().lines().collect::<Vec<_>>().join(" ")),
+    })?;
+    Ok(table(text, root.get_ref()))
+}
+
+fn table(text: &str, source: &DeTable<'_>) -> Table {
+    source.iter().map(|(key, item)| (key.get_ref().to_string(), value(text, item))).collect()
+}
+
+fn value(text: &str, source: &Spanned<DeValue<'_>>) -> Value {
+    let raw = match source.get_ref() {
+        DeValue::String(string) => Raw::Text(string.to_string()),
+        DeValue::Integer(integer) => match i64::from_str_radix(integer.as_str(), integer.radix()) {
+            Ok(number) => Raw::Integer(number),
+            Err(_) => Raw::HugeInteger(integer.to_string()),
+        },
+        // What TOML calls a float is one to Rust too; what is too large becomes infinite, which no range holds.
+        DeValue::Float(float) => Raw::Float(float.as_str().parse().unwrap_or(f64::INFINITY)),
+        DeValue::Boolean(flag) => Raw::Flag(*flag),
+        DeValue::Datetime(_) => Raw::Date,
+        DeValue::Array(items) => Raw::Array(items.iter().map(|item| value(text, item)).collect()),
+        DeValue::Table(items) => Raw::Table(table(text, items)),
+    };
+    Value { place: Place::Line(line_of(text, source.span().start)), raw }
+}
+
+fn line_of(text: &str, position: usize) -> usize {
+    1 + text.bytes().take(position).filter(|byte| *byte == b'\n').count()
+}

@@ -1,0 +1,79 @@
+//! Which component ids the configured gimbals and their managers have.
+//!
+//! Device 154 has manager 191, 171 has 192, 172 has 193, 173 has 194; other gimbals take the free ones in file order.
+
+use super::problem::Problem;
+use super::schema::Gimbal;
+
+/// The managers that need no setting: ONBOARD_COMPUTER to ONBOARD_COMPUTER4.
+const AUTOMATIC: [u8; 4] = [191, 192, 193, 194];
+
+/// Why a manager may not have a component id, as "component … is …".
+fn reserved(id: u8) -> Option<&'static str> {
+    match id {
+        100..=105 => Some("a camera's"),
+        154 | 171..=175 => Some("a gimbal device's"),
+        _ => None,
+    }
+}
+
+pub(super) fn check(gimbals: &[Gimbal], problems: &mut Vec<Problem>) {
+    check_managers(gimbals, problems);
+    check_devices(gimbals, problems);
+}
+
+fn check_managers(gimbals: &[Gimbal], problems: &mut Vec<Problem>) {
+    const EXPECTED: &str = "a component id from 7 to 255 that nobody else on the vehicle has, for example 195";
+    let mut taken = Vec::new();
+    for gimbal in gimbals {
+        let Some(id) = &gimbal.manager_component_id else { continue };
+        if let Some(owner) = reserved(id.value) {
+            problems.push(id.problem(format!("found {}, which is {owner} id", id.value), EXPECTED));
+        } else if taken.contains(&id.value) {
+            problems.push(id.problem(format!("found {}, which another gimbal's manager has", id.value), EXPECTED));
+        }
+        taken.push(id.value);
+    }
+    let free = AUTOMATIC.iter().filter(|id| !taken.contains(id)).count();
+    for gimbal in gimbals.iter().filter(|gimbal| gimbal.manager_component_id.is_none()).skip(free) {
+        let name = gimbal.name.as_ref().map(|name| format!(".{}", name.value)).unwrap_or_default();
+        problems.push(Problem {
+            place: gimbal.place.clone(),
+            key: format!("gimbal{name}.manager_component_id"),
+            found: "missing, and 191 to 194 are taken".to_owned(),
+            expected: EXPECTED.to_owned(),
+        });
+    }
+}
+
+fn check_devices(gimbals: &[Gimbal], problems: &mut Vec<Problem>) {
+    let managers: Vec<u8> = gimbals
+        .iter()
+        .filter_map(|gimbal| gimbal.manager_component_id.as_ref())
+        .map(|id| id.value)
+        .chain(AUTOMATIC)
+        .collect();
+    for (position, gimbal) in gimbals.iter().enumerate() {
+        let Some(id) = &gimbal.component_id else { continue };
+        if managers.contains(&id.value) {
+            let found = format!("found {}, which is a manager's id", id.value);
+            problems.push(id.problem(found, "the component id of the device, for example 154"));
+        }
+        let same = gimbals[..position].iter().any(|earlier| {
+            earlier.component_id.as_ref().is_some_and(|earlier| earlier.value == id.value)
+                && share_link(earlier, gimbal)
+        });
+        if same {
+            let found = format!("found {}, which another gimbal on this link has", id.value);
+            problems.push(id.problem(found, "an id of its own, or another link"));
+        }
+    }
+}
+
+/// A gimbal without a link may be on any.
+fn share_link(a: &Gimbal, b: &Gimbal) -> bool {
+    match (&a.link, &b.link) {
+        (Some(a), Some(b)) => a.value == b.value,
+        _ => true,
+    }
+}

@@ -1,0 +1,462 @@
+//! A simulated v2 gimbal device, as the Gimbal Protocol v2 describes one.
+//!
+//! It obeys `GIMBAL_DEVICE_SET_ATTITUDE` of one manager only, says where it looks in
+//! `GIMBAL_DEVICE_ATTITUDE_STATUS`, and knows North as long as its autopilot tells it the heading.
+
+mod heading;
+mod latch;
+mod reports;
+mod setpoint;
+mod settings;
+
+use std::time::Duration;
+
+pub use settings::{DeviceSettings, Retract, StatusFrame, Strictness, SystemId};
+
+use self::heading::{HeadingBelief, HeadingSource};
+use self::latch::ManagerLatch;
+use self::setpoint::{Mode, Refusal, Setpoint, YawFrame};
+use crate::geometry::{Angle, AngularRate, Attitude, EarthFrame};
+use crate::sim::command::Command;
+use crate::sim::outbox::Outbox;
+use crate::sim::parameters::{IntegerEncoding, ParameterServer, ParameterValue};
+use crate::sim::peer::{Peer, PlatformMotion};
+use crate::sim::plant::{Drive, Plant, YawHold};
+use crate::sim::streams::Streams;
+use crate::timestamp::Timestamp;
+use crate::wire::decoder::Patience;
+use crate::wire::dialect::{
+    ATTITUDE_DATA, AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA, GIMBAL_MANAGER_STATUS_DATA,
+    HEARTBEAT_DATA, STORM32_GIMBAL_MANAGER_STATUS_DATA,
+};
+use crate::wire::ids::{CommandResult, FailureFlags, command, component, mav_type, message};
+use crate::wire::{Frame, MavId, StreamDecoder};
+
+/// System id while no autopilot was heard.
+const FIRST_SYSTEM: u8 = 1;
+
+const HEARTBEAT_INTERVAL: Duration = Duration::from_secs(1);
+/// Of the attitude status before the first setpoint, and after it.
+const IDLE_INTERVAL: Duration = Duration::from_millis(250);
+const ACTIVE_INTERVAL: Duration = Duration::from_millis(100);
+
+/// A frame whose rest does not come within this was noise.
+const DECODER_PATIENCE: Duration = Duration::from_millis(100);
+
+/// Setpoints that had no effect.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RefusedSetpoints {
+    /// Sent by somebody who is not the manager.
+    pub not_manager: u32,
+    /// Both YAW_IN bits, a quaternion that is none, or an infinite rate.
+    pub malformed: u32,
+    /// Frame flags that this device does not take.
+    pub frame: u32,
+    /// Earth frame while the heading is not known.
+    pub no_heading: u32,
+    /// Retracted until a restart.
+    pub retracted: u32,
+}
+
+/// A simulated v2 gimbal device.
+#[derive(Debug)]
+pub struct Device {
+    settings: DeviceSettings,
+    boot: Timestamp,
+    outbox: Outbox,
+    decoder: StreamDecoder,
+    streams: Streams,
+    parameters: ParameterServer,
+    plant: Plant,
+    heading: HeadingBelief,
+    latch: ManagerLatch,
+    mode: Mode,
+    has_adopted: bool,
+    is_speaking: bool,
+    was_steered: bool,
+    /// The vehicle's motion comes from outside, and not from what the autopilot says of it.
+    is_carried: bool,
+    rates_until: Option<Timestamp>,
+    /// Yaw stays where it was last caught, and does not go to an angle or turn.
+    is_yaw_held: bool,
+    failures: FailureFlags,
+    refused: RefusedSetpoints,
+}
+
+impl Device {
+    pub fn new(now: Timestamp, settings: DeviceSettings) -> Self {
+        let system = match settings.system_id {
+            SystemId::Adopt => FIRST_SYSTEM,
+            SystemId::Fixed(system) => system,
+        };
+        let parameters = parameters(&settings);
+        Self {
+            boot: now,
+            outbox: Outbox::new(MavId::new(system, settings.component_id)),
+            decoder: StreamDecoder::new(Patience::Fixed(DECODER_PATIENCE)),
+            streams: Streams::default(),
+            parameters,
+            plant: Plant::new(now, settings.plant.clone()),
+            heading: HeadingBelief::default(),
+            latch: ManagerLatch::default(),
+            mode: Mode::Free,
+            has_adopted: false,
+            is_speaking: false,
+            was_steered: false,
+            is_carried: false,
+            rates_until: None,
+            is_yaw_held: false,
+            failures: FailureFlags::empty(),
+            refused: RefusedSetpoints::default(),
+            settings,
+        }
+    }
+
+    pub fn id(&self) -> MavId {
+        self.outbox.source()
+    }
+
+    /// The mechanics, to look at.
+    pub fn plant(&self) -> &Plant {
+        &self.plant
+    }
+
+    /// Whom it obeys.
+    pub fn manager(&self, now: Timestamp) -> Option<MavId> {
+        self.latch.manager(now)
+    }
+
+    pub fn refused(&self) -> RefusedSetpoints {
+        self.refused
+    }
+
+    /// Reports these failures from now on, next to those it finds itself.
+    pub fn set_failures(&mut self, failures: FailureFlags) {
+        self.failures = failures;
+    }
+
+    /// Moves the mechanics on, stops rates at the moment they expire, and begins to speak when it is time.
+    fn advance(&mut self, now: Timestamp) {
+        if !self.is_speaking && self.speaks_at().is_some_and(|at| at <= now) {
+            self.start_speaking(now);
+        }
+        if let Some(until) = self.rates_until
+            && until <= now
+        {
+            self.plant.advance(until);
+            self.plant.hold();
+            self.is_yaw_held = true;
+            self.rates_until = None;
+        }
+        self.plant.set_heading_reference(self.heading.is_reference(now));
+        self.plant.advance(now);
+    }
+
+    fn start_speaking(&mut self, now: Timestamp) {
+        if self.is_speaking {
+            return;
+        }
+        self.is_speaking = true;
+        let status = if self.was_steered { ACTIVE_INTERVAL } else { IDLE_INTERVAL };
+        self.streams.add(message::HEARTBEAT, Some(HEARTBEAT_INTERVAL), now);
+        self.streams.add(message::GIMBAL_DEVICE_ATTITUDE_STATUS, Some(status), now);
+    }
+
+    fn speaks_at(&self) -> Option<Timestamp> {
+        self.settings.listens_first.map(|wait| self.boot + wait)
+    }
+
+    fn handle_frame(&mut self, now: Timestamp, frame: &Frame<'_>) {
+        let sender = frame.source();
+        if frame.message_id() == message::HEARTBEAT {
+            if let Some(heartbeat) = frame.decode() {
+                self.handle_heartbeat(now, sender, &heartbeat);
+            }
+            return;
+        }
+        if !frame.target().includes(self.id()) {
+            return;
+        }
+        if let Some(command) = Command::read(frame) {
+            if self.is_speaking {
+                self.handle_command(now, &command);
+            }
+            return;
+        }
+        if self.is_speaking && self.parameters.handle_frame(now, frame, &mut self.outbox) {
+            return;
+        }
+        // Nobody of another system steers it or tells it where North is.
+        if sender.system == self.id().system {
+            self.handle_own_system(now, frame);
+        }
+    }
+
+    fn handle_own_system(&mut self, now: Timestamp, frame: &Frame<'_>) {
+        let sender = frame.source();
+        if let Some(setpoint) = frame.decode() {
+            self.handle_set_attitude(now, sender, &setpoint);
+        } else if let Some(status) = frame.decode::<GIMBAL_MANAGER_STATUS_DATA>() {
+            if status.gimbal_device_id == self.settings.component_id {
+                self.latch.handle_announcement(now, sender);
+            }
+        } else if let Some(status) = frame.decode::<STORM32_GIMBAL_MANAGER_STATUS_DATA>() {
+            if status.gimbal_id == self.settings.component_id {
+                self.latch.handle_announcement(now, sender);
+            }
+        } else if let Some(state) = frame.decode() {
+            self.handle_autopilot_state(now, &state);
+        } else if sender.component == component::AUTOPILOT1
+            && let Some(attitude) = frame.decode()
+        {
+            self.handle_attitude(now, &attitude);
+        }
+    }
+
+    fn handle_heartbeat(&mut self, now: Timestamp, sender: MavId, heartbeat: &HEARTBEAT_DATA) {
+        let is_autopilot =
+            sender.component == component::AUTOPILOT1 && !mav_type::NOT_A_VEHICLE.contains(&heartbeat.mavtype);
+        if is_autopilot && !self.has_adopted && self.settings.system_id == SystemId::Adopt {
+            self.has_adopted = true;
+            self.outbox.set_system(sender.system);
+        }
+        if heartbeat.mavtype != mav_type::GCS {
+            self.start_speaking(now);
+        }
+    }
+
+    fn handle_command(&mut self, now: Timestamp, command: &Command) {
+        let answer = match command.number {
+            command::REQUEST_MESSAGE => {
+                let wanted = command.message_id();
+                if self.can_report(wanted) {
+                    command.acknowledge(&mut self.outbox, CommandResult::Accepted);
+                    self.report(now, wanted, command.params[1]);
+                    return;
+                }
+                CommandResult::Denied
+            }
+            command::SET_MESSAGE_INTERVAL => {
+                let id = command.message_id();
+                let is_settable = id == message::GIMBAL_DEVICE_ATTITUDE_STATUS;
+                if is_settable && self.streams.set_interval(now, id, command.params[1]) {
+                    command.acknowledge(&mut self.outbox, CommandResult::Accepted);
+                    return;
+                }
+                CommandResult::Denied
+            }
+            command::GET_MESSAGE_INTERVAL => {
+                command.acknowledge(&mut self.outbox, CommandResult::Accepted);
+                self.report(now, message::MESSAGE_INTERVAL, command.params[0]);
+                return;
+            }
+            _ => CommandResult::Unsupported,
+        };
+        if command.is_directed() {
+            command.acknowledge(&mut self.outbox, answer);
+        }
+    }
+
+    fn handle_set_attitude(&mut self, now: Timestamp, sender: MavId, message: &GIMBAL_DEVICE_SET_ATTITUDE_DATA) {
+        let setpoint = match Setpoint::read(message, self.settings.strictness) {
+            Ok(setpoint) => setpoint,
+            Err(Refusal::Malformed) => {
+                self.refused.malformed += 1;
+                return;
+            }
+            Err(Refusal::Frame) => {
+                self.refused.frame += 1;
+                return;
+            }
+        };
+        if !self.latch.admit(now, sender) {
+            self.refused.not_manager += 1;
+            return;
+        }
+        if !self.was_steered {
+            self.was_steered = true;
+            self.streams.set_usual(now, message::GIMBAL_DEVICE_ATTITUDE_STATUS, ACTIVE_INTERVAL);
+        }
+        if self.mode == Mode::Retract && self.settings.retract == Retract::MotorsOffUntilReboot {
+            self.refused.retracted += 1;
+            return;
+        }
+        let needs_heading = setpoint.mode == Mode::Free && setpoint.angles.is_some();
+        if needs_heading && setpoint.yaw_frame == YawFrame::Earth && self.heading.at(now).is_none() {
+            self.refused.no_heading += 1;
+            return;
+        }
+        self.mode = setpoint.mode;
+        self.rates_until = None;
+        if setpoint.mode == Mode::Retract && self.settings.retract != Retract::Stow {
+            self.plant.release_motors();
+            return;
+        }
+        self.plant.engage_motors();
+        match setpoint.mode {
+            Mode::Retract | Mode::Neutral => {
+                self.is_yaw_held = false;
+                let zero = Drive::To { angle: Angle::ZERO, speed: None };
+                self.plant.set_roll(zero);
+                self.plant.set_pitch(zero);
+                self.plant.set_yaw(YawHold::Vehicle, zero);
+            }
+            Mode::Free => self.steer(now, &setpoint),
+        }
+    }
+
+    /// Angles, with rates as the speed to go there; else rates; else only how yaw is held.
+    fn steer(&mut self, now: Timestamp, setpoint: &Setpoint) {
+        let hold = if setpoint.lock { YawHold::Horizon } else { YawHold::Vehicle };
+        let [roll_rate, pitch_rate, yaw_rate] = setpoint.rates;
+        // A speed of zero would never arrive; senders who set no speed leave it there.
+        let to = |angle: Angle, speed: Option<AngularRate>| Drive::To {
+            angle,
+            speed: speed.filter(|speed| *speed != AngularRate::ZERO),
+        };
+        if let Some(angles) = setpoint.angles {
+            self.is_yaw_held = false;
+            self.plant.set_roll(to(angles.roll, roll_rate));
+            self.plant.set_pitch(to(angles.pitch, pitch_rate));
+            let yaw = self.yaw_goal(now, setpoint.yaw_frame, hold, angles.yaw);
+            self.plant.set_yaw(hold, to(yaw, yaw_rate));
+        } else if setpoint.rates != [None; 3] {
+            self.rates_until = self.settings.rate_expiry.map(|expiry| now + expiry);
+            match roll_rate {
+                Some(rate) => self.plant.set_roll(Drive::Turn(rate)),
+                None => self.plant.hold_roll(),
+            }
+            match pitch_rate {
+                Some(rate) => self.plant.set_pitch(Drive::Turn(rate)),
+                None => self.plant.hold_pitch(),
+            }
+            match yaw_rate {
+                Some(rate) if rate != AngularRate::ZERO => {
+                    self.is_yaw_held = false;
+                    self.plant.set_yaw(hold, Drive::Turn(rate));
+                }
+                // Catching it again and again would let it creep.
+                _ if self.is_yaw_held && self.plant.yaw_hold() == hold => {}
+                _ => {
+                    self.is_yaw_held = true;
+                    self.plant.hold_yaw(hold);
+                }
+            }
+        } else if self.plant.yaw_hold() != hold {
+            self.is_yaw_held = true;
+            self.plant.hold_yaw(hold);
+        }
+    }
+
+    /// The plant's yaw for one in a setpoint: against the vehicle, or against the plant's own horizon.
+    fn yaw_goal(&self, now: Timestamp, frame: YawFrame, hold: YawHold, yaw: Angle) -> Angle {
+        let platform = self.plant.platform_heading(now);
+        let heading = self.heading.at(now).map_or(platform, |(heading, _)| heading);
+        match (frame, hold) {
+            (YawFrame::Vehicle, YawHold::Vehicle) => yaw,
+            (YawFrame::Vehicle, YawHold::Horizon) => yaw + platform,
+            (YawFrame::Earth, YawHold::Vehicle) => yaw - heading,
+            (YawFrame::Earth, YawHold::Horizon) => yaw - heading + platform,
+        }
+    }
+
+    fn handle_autopilot_state(&mut self, now: Timestamp, state: &AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA) {
+        let Ok(Some(attitude)) = Attitude::<EarthFrame>::from_wxyz(state.q) else { return };
+        // Zero stands for unknown in this field.
+        let rate = f64::from(state.angular_velocity_z);
+        let rate = (rate.is_finite() && rate != 0.0).then(|| AngularRate::from_radians_per_second(rate));
+        let taken = self.heading.handle_heading(now, HeadingSource::State, attitude.heading(), rate);
+        self.ride(now, taken, [0.0, 0.0]);
+    }
+
+    fn handle_attitude(&mut self, now: Timestamp, attitude: &ATTITUDE_DATA) {
+        let [yaw, roll_rate, pitch_rate, yaw_rate] =
+            [attitude.yaw, attitude.rollspeed, attitude.pitchspeed, attitude.yawspeed].map(f64::from);
+        if !yaw.is_finite() {
+            return;
+        }
+        let rate = yaw_rate.is_finite().then(|| AngularRate::from_radians_per_second(yaw_rate));
+        let taken = self.heading.handle_heading(now, HeadingSource::Attitude, Angle::from_radians(yaw), rate);
+        let finite = |rate: f64| if rate.is_finite() { rate } else { 0.0 };
+        self.ride(now, taken, [finite(roll_rate), finite(pitch_rate)]);
+    }
+
+    /// Moves with the vehicle as the autopilot tells it, unless the vehicle's own motion is known.
+    fn ride(&mut self, now: Timestamp, is_news: bool, roll_and_pitch_rate: [f64; 2]) {
+        let Some((heading, heading_rate)) = self.heading.at(now) else { return };
+        if self.is_carried || !is_news {
+            return;
+        }
+        let [roll_rate, pitch_rate] = roll_and_pitch_rate.map(AngularRate::from_radians_per_second);
+        let heading = heading.nearest_to(self.plant.platform_heading(now));
+        self.plant.set_platform(now, PlatformMotion { heading, heading_rate, roll_rate, pitch_rate });
+    }
+
+    fn send_due(&mut self, now: Timestamp) {
+        while let Some(id) = self.streams.pop_due(now) {
+            self.report(now, id, 0.0);
+        }
+        self.parameters.handle_timeout(now, &mut self.outbox);
+    }
+
+    fn read_frames(&mut self, now: Timestamp) {
+        let mut decoder = std::mem::take(&mut self.decoder);
+        while let Some(frame) = decoder.next_frame() {
+            self.handle_frame(now, &frame);
+        }
+        self.decoder = decoder;
+    }
+}
+
+impl Peer for Device {
+    fn handle_received(&mut self, now: Timestamp, bytes: &[u8]) {
+        self.advance(now);
+        self.decoder.push(now, bytes);
+        self.read_frames(now);
+        self.send_due(now);
+    }
+
+    fn handle_timeout(&mut self, now: Timestamp) {
+        self.advance(now);
+        if self.decoder.poll_timeout().is_some_and(|at| at <= now) {
+            self.decoder.handle_timeout(now);
+            self.read_frames(now);
+        }
+        self.send_due(now);
+    }
+
+    fn poll_output(&mut self) -> Option<Vec<u8>> {
+        self.outbox.poll()
+    }
+
+    fn poll_timeout(&self) -> Option<Timestamp> {
+        let speaks = if self.is_speaking { self.streams.poll_timeout() } else { self.speaks_at() };
+        let others = [self.parameters.poll_timeout(), self.decoder.poll_timeout(), self.rates_until];
+        others.into_iter().chain([speaks]).flatten().min()
+    }
+
+    fn handle_reboot(&mut self, now: Timestamp) {
+        *self = Self::new(now, self.settings.clone());
+    }
+
+    fn handle_disturbance(&mut self, now: Timestamp, motion: PlatformMotion) {
+        self.is_carried = true;
+        self.advance(now);
+        self.plant.set_platform(now, motion);
+    }
+}
+
+fn parameters(settings: &DeviceSettings) -> ParameterServer {
+    let pitch = settings.plant.limits.pitch;
+    let degrees = |angle: Option<Angle>| ParameterValue::Float(angle.map_or(f32::NAN, |angle| angle.degrees() as f32));
+    let list = vec![
+        ("SIM_COMP_ID", ParameterValue::Integer(i32::from(settings.component_id))),
+        ("SIM_RATE_MAX", ParameterValue::Float(settings.plant.max_rate.degrees_per_second() as f32)),
+        ("SIM_TILT_MAX", degrees(pitch.map(|limits| limits.max()))),
+        ("SIM_TILT_MIN", degrees(pitch.map(|limits| limits.min()))),
+    ];
+    ParameterServer::new(list, IntegerEncoding::Bytewise)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,165 @@
+//! What the device says of itself.
+
+use super::setpoint::Mode;
+use super::{Device, StatusFrame};
+use crate::geometry::{Angle, AngularRate, Attitude, AxisLimits, EarthFrame, GimbalAngles};
+use crate::sim::plant::YawHold;
+use crate::timestamp::Timestamp;
+use crate::wire::dialect::{
+    CharArray, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA, HEARTBEAT_DATA,
+    MESSAGE_INTERVAL_DATA,
+};
+use crate::wire::ids::{CapFlags, FailureFlags, GimbalFlags, mav_autopilot, mav_state, mav_type, message};
+
+impl Device {
+    pub(super) fn can_report(&self, id: u32) -> bool {
+        matches!(
+            id,
+            message::HEARTBEAT
+                | message::MESSAGE_INTERVAL
+                | message::GIMBAL_DEVICE_INFORMATION
+                | message::GIMBAL_DEVICE_ATTITUDE_STATUS
+        )
+    }
+
+    /// Sends message `id`; `argument` says of which message an interval is wanted.
+    pub(super) fn report(&mut self, now: Timestamp, id: u32, argument: f64) {
+        match id {
+            message::HEARTBEAT => self.outbox.send(&HEARTBEAT_DATA {
+                custom_mode: 0,
+                mavtype: mav_type::GIMBAL,
+                autopilot: mav_autopilot::INVALID,
+                base_mode: 0,
+                system_status: mav_state::ACTIVE,
+                mavlink_version: 3,
+            }),
+            message::MESSAGE_INTERVAL => {
+                // A float cast saturates, and turns NaN into 0.
+                let message_id = argument.round() as u16;
+                let interval_us = self.streams.interval_us(u32::from(message_id));
+                self.outbox.send(&MESSAGE_INTERVAL_DATA { interval_us, message_id });
+            }
+            message::GIMBAL_DEVICE_INFORMATION => {
+                let information = self.information(now);
+                self.outbox.send(&information);
+            }
+            message::GIMBAL_DEVICE_ATTITUDE_STATUS => {
+                let status = self.attitude_status(now);
+                self.outbox.send(&status);
+            }
+            _ => {}
+        }
+    }
+
+    fn boot_ms(&self, now: Timestamp) -> u32 {
+        (Timestamp::ZERO + now.since(self.boot)).boot_ms()
+    }
+
+    fn information(&self, now: Timestamp) -> GIMBAL_DEVICE_INFORMATION_DATA {
+        let settings = &self.settings;
+        let limits = settings.plant.limits;
+        let bounds = |axis: Option<AxisLimits>| {
+            let bound = |angle: Angle| angle.radians() as f32;
+            axis.map_or((f32::NAN, f32::NAN), |axis| (bound(axis.min()), bound(axis.max())))
+        };
+        let (roll_min, roll_max) = bounds(limits.roll);
+        let (pitch_min, pitch_max) = bounds(limits.pitch);
+        let (yaw_min, yaw_max) = if settings.capabilities.contains(CapFlags::SUPPORTS_INFINITE_YAW) {
+            // MAVSDK's gimbal_device_tester knows a yaw without limits by these.
+            (f32::NEG_INFINITY, f32::INFINITY)
+        } else {
+            bounds(limits.yaw)
+        };
+        GIMBAL_DEVICE_INFORMATION_DATA {
+            uid: settings.uid,
+            time_boot_ms: self.boot_ms(now),
+            firmware_version: u32::from_le_bytes(settings.firmware_version),
+            hardware_version: u32::from_le_bytes(settings.hardware_version),
+            roll_min,
+            roll_max,
+            pitch_min,
+            pitch_max,
+            yaw_min,
+            yaw_max,
+            // The older field holds the lower half of the set.
+            cap_flags: settings.capabilities.bits() as u16,
+            custom_cap_flags: 0,
+            vendor_name: CharArray::from(settings.vendor_name.as_str()),
+            model_name: CharArray::from(settings.model_name.as_str()),
+            custom_name: CharArray::from(settings.custom_name.as_str()),
+            gimbal_device_id: 0,
+            cap_flags2: if settings.has_cap_flags2 { settings.capabilities.bits() } else { 0 },
+        }
+    }
+
+    fn attitude_status(&mut self, now: Timestamp) -> GIMBAL_DEVICE_ATTITUDE_STATUS_DATA {
+        let pose = self.plant.measure(now);
+        let heading = self.heading.at(now);
+        let locked = self.mode == Mode::Free && self.plant.yaw_hold() == YawHold::Horizon;
+        let in_earth = match self.settings.status_frame {
+            StatusFrame::EarthWhenKnown => heading,
+            StatusFrame::FollowsLock => heading.filter(|_| locked),
+            // Where North is not known, what it is locked to is its own zero.
+            StatusFrame::Legacy if locked => {
+                Some(heading.unwrap_or_else(|| (self.plant.platform_heading(now), AngularRate::ZERO)))
+            }
+            StatusFrame::Legacy => None,
+        };
+        let mut yaw = pose.yaw;
+        let mut yaw_rate = pose.yaw_rate.radians_per_second();
+        if let Some((heading, heading_rate)) = in_earth {
+            yaw += heading;
+            yaw_rate += heading_rate.radians_per_second();
+        }
+        // The frame is told by the flags, so the type's frame is a formality here.
+        let attitude =
+            Attitude::<EarthFrame>::from_gimbal_angles(GimbalAngles { roll: pose.roll, pitch: pose.pitch, yaw });
+        let (delta_yaw, delta_yaw_velocity) = match (self.settings.status_frame, heading) {
+            (StatusFrame::Legacy, _) => (0.0, 0.0),
+            (_, Some((heading, rate))) => (heading.wrapped().radians() as f32, rate.radians_per_second() as f32),
+            (_, None) => (f32::NAN, f32::NAN),
+        };
+        GIMBAL_DEVICE_ATTITUDE_STATUS_DATA {
+            time_boot_ms: self.boot_ms(now),
+            q: attitude.to_wxyz(),
+            angular_velocity_x: pose.roll_rate.radians_per_second() as f32,
+            angular_velocity_y: pose.pitch_rate.radians_per_second() as f32,
+            angular_velocity_z: yaw_rate as f32,
+            failure_flags: self.failure_flags(now).bits(),
+            flags: self.flags(locked, heading.is_some(), in_earth.is_some()).bits(),
+            target_system: 0,
+            target_component: 0,
+            delta_yaw,
+            delta_yaw_velocity,
+            gimbal_device_id: 0,
+        }
+    }
+
+    fn flags(&self, locked: bool, knows_heading: bool, in_earth: bool) -> GimbalFlags {
+        let mut flags = match self.mode {
+            // Retracted it does not stabilise.
+            Mode::Retract => GimbalFlags::RETRACT,
+            Mode::Neutral => GimbalFlags::NEUTRAL | GimbalFlags::ROLL_LOCK | GimbalFlags::PITCH_LOCK,
+            Mode::Free => GimbalFlags::ROLL_LOCK | GimbalFlags::PITCH_LOCK,
+        };
+        flags.set(GimbalFlags::YAW_LOCK, locked);
+        if self.settings.status_frame != StatusFrame::Legacy {
+            flags.set(GimbalFlags::YAW_IN_EARTH_FRAME, in_earth);
+            flags.set(GimbalFlags::YAW_IN_VEHICLE_FRAME, !in_earth);
+            let accepts = knows_heading && self.settings.strictness != super::Strictness::VehicleOnly;
+            let accepts = accepts && self.settings.capabilities.contains(CapFlags::SUPPORTS_YAW_IN_EARTH_FRAME);
+            flags.set(GimbalFlags::ACCEPTS_YAW_IN_EARTH_FRAME, accepts);
+        }
+        flags
+    }
+
+    fn failure_flags(&self, now: Timestamp) -> FailureFlags {
+        let limit = self.plant.at_limit();
+        let mut flags = self.failures;
+        flags.set(FailureFlags::AT_ROLL_LIMIT, limit.roll);
+        flags.set(FailureFlags::AT_PITCH_LIMIT, limit.pitch);
+        flags.set(FailureFlags::AT_YAW_LIMIT, limit.yaw);
+        flags.set(FailureFlags::NO_MANAGER, self.latch.manager(now).is_none());
+        flags
+    }
+}

@@ -1,0 +1,154 @@
+//! A simulated autopilot, circling, that QGroundControl and MAVSDK take for a vehicle.
+//!
+//! It sends what PX4 or ArduPilot sends at similar rates, and answers what a ground station asks before it shows a
+//! vehicle: version, parameters, mission, fence and rally points. It has no gimbal manager of its own.
+
+mod answers;
+mod flight;
+mod parameters;
+mod telemetry;
+
+use std::time::Duration;
+
+pub use flight::{HEIGHT_M, HOME, Motion, RADIUS_M, SPEED_MPS};
+
+use crate::sim::outbox::Outbox;
+use crate::sim::parameters::{ParameterServer, ParameterValue};
+use crate::sim::peer::{Peer, PlatformMotion};
+use crate::sim::streams::Streams;
+use crate::timestamp::Timestamp;
+use crate::wire::decoder::Patience;
+use crate::wire::{MavId, StreamDecoder};
+
+/// A frame whose rest does not come within this was noise.
+const DECODER_PATIENCE: Duration = Duration::from_millis(100);
+
+/// Which autopilot a simulated vehicle has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Autopilot {
+    Px4,
+    ArduPilot,
+}
+
+/// Everything that differs from one simulated vehicle to another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VehicleSettings {
+    pub autopilot: Autopilot,
+    pub system_id: u8,
+    /// Whether it knows `AUTOPILOT_STATE_FOR_GIMBAL_DEVICE`, which PX4 streams and ArduPilot sends when asked.
+    pub tells_gimbals: bool,
+    /// Microseconds since 1970 when `now` is zero; unknown when `None`.
+    pub unix_time_us: Option<u64>,
+}
+
+impl Default for VehicleSettings {
+    fn default() -> Self {
+        Self { autopilot: Autopilot::Px4, system_id: 1, tells_gimbals: true, unix_time_us: None }
+    }
+}
+
+/// A simulated autopilot in flight.
+#[derive(Debug)]
+pub struct Vehicle {
+    settings: VehicleSettings,
+    boot: Timestamp,
+    outbox: Outbox,
+    decoder: StreamDecoder,
+    streams: Streams,
+    parameters: ParameterServer,
+    is_armed: bool,
+    custom_mode: u32,
+}
+
+impl Vehicle {
+    pub fn new(now: Timestamp, settings: VehicleSettings) -> Self {
+        let mut streams = Streams::default();
+        for (id, usual) in telemetry::usual_streams(settings.autopilot, settings.tells_gimbals) {
+            streams.add(id, usual, now);
+        }
+        Self {
+            boot: now,
+            outbox: Outbox::new(MavId::new(settings.system_id, telemetry::COMPONENT)),
+            decoder: StreamDecoder::new(Patience::Fixed(DECODER_PATIENCE)),
+            streams,
+            parameters: parameters::parameters(settings.autopilot, settings.system_id),
+            is_armed: true,
+            custom_mode: match settings.autopilot {
+                // Main mode auto, sub mode loiter.
+                Autopilot::Px4 => 4 << 16 | 3 << 24,
+                // Circle.
+                Autopilot::ArduPilot => 7,
+            },
+            settings,
+        }
+    }
+
+    pub fn id(&self) -> MavId {
+        self.outbox.source()
+    }
+
+    /// Where it is and how it moves.
+    pub fn motion(&self, now: Timestamp) -> Motion {
+        flight::motion_at(Timestamp::ZERO + now.since(self.boot))
+    }
+
+    /// The same as a gimbal on it feels it.
+    pub fn platform_motion(&self, now: Timestamp) -> PlatformMotion {
+        let motion = self.motion(now);
+        // Bank and pitch do not change on the circle.
+        PlatformMotion { heading: motion.attitude.yaw, heading_rate: motion.heading_rate, ..PlatformMotion::default() }
+    }
+
+    pub fn parameter(&self, name: &str) -> Option<ParameterValue> {
+        self.parameters.value(name)
+    }
+
+    fn read_frames(&mut self, now: Timestamp) {
+        let mut decoder = std::mem::take(&mut self.decoder);
+        while let Some(frame) = decoder.next_frame() {
+            if frame.target().includes(self.id()) {
+                self.handle_request(now, &frame);
+            }
+        }
+        self.decoder = decoder;
+    }
+
+    fn send_due(&mut self, now: Timestamp) {
+        while let Some(id) = self.streams.pop_due(now) {
+            self.report(now, id);
+        }
+        self.parameters.handle_timeout(now, &mut self.outbox);
+    }
+}
+
+impl Peer for Vehicle {
+    fn handle_received(&mut self, now: Timestamp, bytes: &[u8]) {
+        self.decoder.push(now, bytes);
+        self.read_frames(now);
+        self.send_due(now);
+    }
+
+    fn handle_timeout(&mut self, now: Timestamp) {
+        if self.decoder.poll_timeout().is_some_and(|at| at <= now) {
+            self.decoder.handle_timeout(now);
+            self.read_frames(now);
+        }
+        self.send_due(now);
+    }
+
+    fn poll_output(&mut self) -> Option<Vec<u8>> {
+        self.outbox.poll()
+    }
+
+    fn poll_timeout(&self) -> Option<Timestamp> {
+        let timers = [self.streams.poll_timeout(), self.parameters.poll_timeout(), self.decoder.poll_timeout()];
+        timers.into_iter().flatten().min()
+    }
+
+    fn handle_reboot(&mut self, now: Timestamp) {
+        *self = Self::new(now, self.settings);
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,587 @@
+//! What `gimbald check` says of wrong configurations, word for word.
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
+use std::time::Duration;
+
+use gimbald::bridge::settings::{LinkSettings, Role, Settings, SystemId, Transport};
+use gimbald::config::settings::{DaemonSettings, HttpSettings};
+use gimbald::config::{self, problem::Problems};
+use gimbald::gimbals::settings::{DeviceYawFrame, Family, GimbalSettings, Takeover};
+use gimbald::manager::settings::{AltitudeReference, ControlSettings, Firewall};
+
+use crate::gimbald::{Outcome, gimbald};
+
+/// A link, so that what is wrong is what the test is about.
+const LINK: &str = "[[link]]\nname = \"ground\"\nrole = \"ground\"\nendpoint = \"udpin:0.0.0.0:14550\"\n";
+
+fn check(text: &str, variables: &[(&str, &str)]) -> Outcome {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    fs::write(folder.path().join("c.toml"), text).expect("a writable folder");
+    gimbald(folder.path(), &["check", "--config", "c.toml"], variables)
+}
+
+fn refused(lines: &[&str]) -> Outcome {
+    Outcome { code: Some(78), output: String::new(), errors: lines.iter().map(|line| format!("{line}\n")).collect() }
+}
+
+/// `LINK` with `text` behind it (so that `text` begins in line 5) is refused with exactly these lines.
+#[track_caller]
+fn assert_refused(text: &str, lines: &[&str]) {
+    assert_eq!(check(&format!("{LINK}{text}"), &[]), refused(lines), "{text}");
+}
+
+#[test]
+fn a_right_file_is_summed_up_in_one_line() {
+    let outcome = check(LINK, &[]);
+    let output = "c.toml: ok; links: ground (udpin:0.0.0.0:14550); gimbals: those that are found; page: \
+                  http://127.0.0.1:8080\n";
+    assert_eq!(outcome, Outcome { code: Some(0), output: output.to_owned(), errors: String::new() });
+}
+
+/// "every problem at once with file, line, key, what was expected".
+#[test]
+fn every_problem_of_a_file_is_reported_at_once_in_the_order_of_its_lines() {
+    let text = r#"[vehicle]
+system_id = 0
+
+[[link]]
+name = "gimbal"
+role = "gimabl"
+endpoint = "serial:/dev/serial0:fast"
+
+[[link]]
+name = "ground"
+role = "ground"
+endpoint = "udpot:192.168.1.255:14550"
+max_rate_hz = { 285 = 4, 281 = 0, foo = 1 }
+colour = 1
+
+[[link]]
+name = "Gimbal"
+
+[[gimbal]]
+name = "camera"
+link = "gimbl"
+family = "mavlink_v1"
+
+[htp]
+
+[control]
+lease_timeout_s = -1
+"#;
+    let lines = [
+        r#"c.toml:2: vehicle.system_id: found 0; expected "auto" or a whole number from 1 to 255"#,
+        r#"c.toml:6: link.gimbal.role: found "gimabl"; expected gimbal, autopilot, ground or peer; did you mean gimbal?"#,
+        r#"c.toml:7: link.gimbal.endpoint: found "serial:/dev/serial0:fast"; expected a baud rate from 1200 to 4000000 behind the last colon"#,
+        r#"c.toml:12: link.ground.endpoint: found "udpot:192.168.1.255:14550"; expected KIND:… with KIND one of serial, udpin, udpout, udpbcast, tcpin, tcpout; did you mean udpout?"#,
+        "c.toml:13: link.ground.max_rate_hz.281: found 0; expected a number of messages per second from 0.001 to 1000",
+        "c.toml:13: link.ground.max_rate_hz.foo: found 1; expected a message id from 0 to 16777215 as the key",
+        "c.toml:14: link.ground.colour: unknown key; expected one of name, role, endpoint, max_rate_hz",
+        "c.toml:16: link.Gimbal.role: missing; expected gimbal, autopilot, ground or peer",
+        "c.toml:16: link.Gimbal.endpoint: missing; expected an endpoint, for example udpin:0.0.0.0:14550",
+        r#"c.toml:17: link.Gimbal.name: found "Gimbal", the name in line 5; expected a name that differs from all others in more than case and - or _"#,
+        r#"c.toml:21: gimbal.camera.link: found "gimbl"; expected the name of a link, one of gimbal, ground, Gimbal; did you mean gimbal?"#,
+        r#"c.toml:22: gimbal.camera.family: found "mavlink_v1"; expected auto or mavlink_v2; did you mean mavlink_v2?"#,
+        "c.toml:24: htp: unknown key; expected one of vehicle, link, gimbal, control, roi, http; did you mean http?",
+        "c.toml:27: control.lease_timeout_s: found -1; expected a number of seconds from 0.001 to 3600",
+    ];
+    assert_eq!(check(text, &[]), refused(&lines));
+}
+
+#[test]
+fn a_file_that_is_no_toml_has_one_problem() {
+    for (text, line) in [
+        ("[vehicle\nx = 1", "c.toml:1: not TOML; expected a TOML file, but: unclosed table, expected `]`"),
+        ("[http]\na = 1\na = 2\n", "c.toml:3: not TOML; expected a TOML file, but: duplicate key"),
+        (
+            "\n\nrole = ground",
+            "c.toml:3: not TOML; expected a TOML file, but: string values must be quoted, expected literal string",
+        ),
+    ] {
+        assert_eq!(check(text, &[("GIMBALD__NONSENSE", "1")]), refused(&[line]), "{text}");
+    }
+}
+
+#[test]
+fn a_file_that_cannot_be_read_is_a_problem_of_the_configuration() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let check = |name| gimbald(folder.path(), &["check", "--config", name], &[]);
+    fs::create_dir(folder.path().join("folder")).expect("a writable folder");
+    fs::write(folder.path().join("latin1.toml"), b"# a\n# caf\xe9\n").expect("a writable folder");
+
+    assert_eq!(check("absent.toml"), refused(&["absent.toml: no such file; expected a readable TOML file"]));
+    assert_eq!(
+        check("folder"),
+        refused(&["folder: cannot be read: Is a directory (os error 21); expected a readable TOML file"])
+    );
+    assert_eq!(
+        check("latin1.toml"),
+        refused(&["latin1.toml:2: a byte that is not UTF-8; expected a TOML file in UTF-8"])
+    );
+}
+
+#[test]
+fn wrong_arguments_are_usage_errors_and_never_reach_the_configuration() {
+    for arguments in [&["chek"][..], &["check", "--log", "gimbald=loud"], &["check", "c.toml"], &["sim"], &[]] {
+        let outcome = gimbald(Path::new("/"), arguments, &[]);
+        assert_eq!((outcome.code, outcome.output.as_str()), (Some(64), ""), "{arguments:?}");
+        assert!(outcome.errors.contains("--help"), "{}", outcome.errors);
+    }
+}
+
+#[test]
+fn a_file_without_a_link_has_nothing_to_do() {
+    let missing = "c.toml: link: missing; expected at least one [[link]] with name, role and endpoint";
+    for text in ["", "[http]\n", "link = []\n"] {
+        assert_eq!(check(text, &[]), refused(&[missing]), "{text:?}");
+    }
+}
+
+#[test]
+fn a_section_of_the_wrong_kind_is_said_to_be_one() {
+    for (text, line) in [
+        ("[link]\nname = \"x\"\n", "c.toml:1: link: found a table; expected one or more tables [[link]]"),
+        ("link = [1]\n", "c.toml:1: link: found 1; expected one or more tables [[link]]"),
+    ] {
+        assert_eq!(check(text, &[]), refused(&[line]), "{text}");
+    }
+    assert_refused("[[http]]\n", &["c.toml:5: http: found an array; expected a table [http]"]);
+    assert_eq!(
+        check(&format!("http = 1\n{LINK}"), &[("GIMBALD__HTTP__LISTEN", "127.0.0.1:1")]),
+        refused(&["c.toml:1: http: found 1; expected a table [http]"])
+    );
+}
+
+#[test]
+fn names_can_be_written_in_a_variable() {
+    assert_refused(
+        "[[gimbal]]\nname = \"nose cam\"\n[[gimbal]]\nname = \"\"\n[[gimbal]]\nname = 7\n",
+        &[
+            "c.toml:6: gimbal.name: found \"nose cam\"; expected a name of letters, digits, - and _",
+            "c.toml:8: gimbal.name: found \"\"; expected a name of letters, digits, - and _",
+            "c.toml:10: gimbal.name: found 7; expected a name of letters, digits, - and _",
+        ],
+    );
+    assert_refused(
+        "[[gimbal]]\nname = \"nose-cam\"\n[[gimbal]]\nname = \"Nose_Cam\"\n",
+        &[
+            r#"c.toml:8: gimbal.Nose_Cam.name: found "Nose_Cam", the name in line 6; expected a name that differs from all others in more than case and - or _"#,
+        ],
+    );
+}
+
+#[test]
+fn numbers_have_ranges_and_kinds() {
+    for (line, problem) in [
+        ("setpoint_rate_hz = 4", "found 4; expected a whole number from 5 to 50"),
+        ("setpoint_rate_hz = 51", "found 51; expected a whole number from 5 to 50"),
+        ("setpoint_rate_hz = 20.0", "found 20.0; expected a whole number from 5 to 50"),
+        ("setpoint_rate_hz = \"20\"", "found \"20\"; expected a whole number from 5 to 50"),
+        ("component_id = 6", "found 6; expected a whole number from 7 to 255"),
+        ("component_id = 256", "found 256; expected a whole number from 7 to 255"),
+        ("manager_component_id = 1", "found 1; expected a whole number from 7 to 255"),
+        ("component_id = 99999999999999999999", "found 99999999999999999999; expected a whole number from 7 to 255"),
+        ("manual_yaw_rate_dps = 0", "found 0; expected a number of degrees per second from 0.1 to 720"),
+        ("manual_yaw_rate_dps = nan", "found NaN; expected a number of degrees per second from 0.1 to 720"),
+        ("manual_pitch_rate_dps = inf", "found inf; expected a number of degrees per second from 0.1 to 720"),
+        ("takeover = \"priority\"", "found \"priority\"; expected open or ask"),
+        ("takeover = true", "found true; expected open or ask"),
+        ("device_yaw_frame = \"erath\"", "found \"erath\"; expected auto, vehicle or earth; did you mean earth?"),
+        ("family = \"gremsy\"", "found \"gremsy\"; expected auto or mavlink_v2"),
+        ("link = 1", "found 1; expected the name of a link as text"),
+    ] {
+        let (key, _) = line.split_once(' ').expect("key and value");
+        assert_refused(
+            &format!("[[gimbal]]\nname = \"camera\"\n{line}\n"),
+            &[&format!("c.toml:7: gimbal.camera.{key}: {problem}")],
+        );
+    }
+    for (line, problem) in [
+        ("lease_timeout_s = 0", "found 0; expected a number of seconds from 0.001 to 3600"),
+        ("lease_timeout_s = 3600.1", "found 3600.1; expected a number of seconds from 0.001 to 3600"),
+        ("rate_timeout_s = 1e-9", "found 1e-9; expected a number of seconds from 0.001 to 3600"),
+        ("command_rate_timeout_s = -1", "found -1; expected a number of seconds from 0.001 to 3600, or 0 for never"),
+        ("unclaimed = \"close\"", "found \"close\"; expected open or closed; did you mean closed?"),
+        ("firewall = \"off\"", "found \"off\"; expected on or warn"),
+        ("snoop_autopilot = \"true\"", "found \"true\"; expected true or false"),
+        ("px4_release_quirk = 1979-05-27", "found a date; expected true or false"),
+    ] {
+        let (key, _) = line.split_once(' ').expect("key and value");
+        assert_refused(&format!("[control]\n{line}\n"), &[&format!("c.toml:6: control.{key}: {problem}")]);
+    }
+    for line in ["281 = 1e-300", "281 = 1e9", "281 = -1", "281 = \"4\"", "281 = nan"] {
+        let outcome = check(&format!("{LINK}max_rate_hz = {{ {line} }}\n"), &[]);
+        assert!(outcome.errors.ends_with("; expected a number of messages per second from 0.001 to 1000\n"), "{line}");
+    }
+    for id in ["16777216", "-1", "0281", "\"\""] {
+        let outcome = check(&format!("{LINK}max_rate_hz = {{ {id} = 1 }}\n"), &[]);
+        assert!(outcome.errors.ends_with("; expected a message id from 0 to 16777215 as the key\n"), "{id}");
+    }
+}
+
+/// "a fifth needs `manager_component_id`".
+#[test]
+fn managers_have_ids_of_their_own() {
+    const EXPECTED: &str = "expected a component id from 7 to 255 that nobody else on the vehicle has, for example 195";
+    let gimbals = |ids: &[Option<u8>]| -> String {
+        let entry = |(number, id): (usize, &Option<u8>)| match id {
+            Some(id) => format!("[[gimbal]]\nname = \"g{number}\"\nmanager_component_id = {id}\n"),
+            None => format!("[[gimbal]]\nname = \"g{number}\"\n"),
+        };
+        ids.iter().enumerate().map(entry).collect()
+    };
+    let four = [None; 4];
+    assert_eq!(check(&format!("{LINK}{}", gimbals(&four)), &[]).code, Some(0));
+    assert_refused(
+        &gimbals(&[None; 5]),
+        &[&format!("c.toml:13: gimbal.g4.manager_component_id: missing, and 191 to 194 are taken; {EXPECTED}")],
+    );
+    assert_eq!(check(&format!("{LINK}{}", gimbals(&[None, None, None, None, Some(195)])), &[]).code, Some(0));
+    assert_refused(
+        &gimbals(&[Some(192), None, None, None, None]),
+        &[&format!("c.toml:14: gimbal.g4.manager_component_id: missing, and 191 to 194 are taken; {EXPECTED}")],
+    );
+    for (id, owner) in
+        [(100, "a camera's"), (105, "a camera's"), (154, "a gimbal device's"), (175, "a gimbal device's")]
+    {
+        assert_refused(
+            &gimbals(&[Some(id)]),
+            &[&format!("c.toml:7: gimbal.g0.manager_component_id: found {id}, which is {owner} id; {EXPECTED}")],
+        );
+    }
+    assert_refused(
+        &gimbals(&[Some(200), Some(200)]),
+        &[&format!(
+            "c.toml:10: gimbal.g1.manager_component_id: found 200, which another gimbal's manager has; {EXPECTED}"
+        )],
+    );
+}
+
+#[test]
+fn devices_have_ids_of_their_own_on_their_link() {
+    // The entry of b begins in the line after that of a.
+    let two = |a: &str, b: &str| {
+        let device = "component_id = 154\n";
+        format!("[[gimbal]]\nname = \"a\"\n{device}{a}[[gimbal]]\nname = \"b\"\n{b}{device}")
+    };
+    let on_ground = "link = \"ground\"\n";
+    let same = "gimbal.b.component_id: found 154, which another gimbal on this link has; expected an id of its own, or another link";
+    assert_refused(&two("", ""), &[&format!("c.toml:10: {same}")]);
+    // A gimbal without a link may turn out to be on the same one.
+    assert_refused(&two(on_ground, ""), &[&format!("c.toml:11: {same}")]);
+    assert_refused(&two(on_ground, on_ground), &[&format!("c.toml:12: {same}")]);
+    let manager = "gimbal.a.component_id: found 191, which is a manager's id; expected the component id of the device, for example 154";
+    assert_refused("[[gimbal]]\nname = \"a\"\ncomponent_id = 191\n", &[&format!("c.toml:7: {manager}")]);
+    let second_link = "[[link]]\nname = \"radio\"\nrole = \"ground\"\nendpoint = \"udpin:0.0.0.0:14551\"\n";
+    let apart = two(on_ground, "link = \"radio\"\n");
+    assert_eq!(check(&format!("{LINK}{second_link}{apart}"), &[]).code, Some(0));
+}
+
+#[test]
+fn two_links_cannot_share_a_port() {
+    #[rustfmt::skip]
+    let rows = [
+        ("udpin:0.0.0.0:14550",    "udpin:127.0.0.1:14550",  Some("the port of the link in line 4; expected a port of its own")),
+        ("udpin:10.0.0.1:14550",   "udpin:127.0.0.1:14550",  None),
+        ("udpin:0.0.0.0:14550",    "tcpin:0.0.0.0:14550",    None),
+        ("udpin:127.0.0.1:0",      "udpin:127.0.0.1:0",      None),
+        ("tcpin:[::]:5760",        "tcpin:0.0.0.0:5760",     Some("the port of the link in line 4; expected a port of its own")),
+        ("serial:/dev/ttyX:57600", "serial:/dev/ttyX:9600",  Some("the serial port of the link in line 4; expected a serial port of its own")),
+        ("serial:/dev/null:57600", "serial:/dev/./null:1200", Some("the serial port of the link in line 4; expected a serial port of its own")),
+        ("serial:/dev/ttyX:57600", "serial:/dev/ttyY:57600", None),
+        ("udpout:10.0.0.1:14550",  "udpout:10.0.0.1:14550",  Some("the peer of the link in line 4; expected a peer of its own")),
+        ("udpout:10.0.0.1:14550",  "udpout:10.0.0.1:14551",  None),
+    ];
+    for (first, second, problem) in rows {
+        let text = format!("{}{}", LINK.replace("udpin:0.0.0.0:14550", first), {
+            LINK.replace("ground\"\nrole", "second\"\nrole").replace("udpin:0.0.0.0:14550", second)
+        });
+        let outcome = check(&text, &[]);
+        match problem {
+            Some(problem) => {
+                let line = format!("c.toml:8: link.second.endpoint: found \"{second}\", {problem}");
+                assert_eq!(outcome, refused(&[&line]));
+            }
+            None => assert_eq!((outcome.code, outcome.errors.as_str()), (Some(0), ""), "{first} {second}"),
+        }
+    }
+    let page = "c.toml:4: link.ground.endpoint: found \"tcpin:0.0.0.0:8080\", the port of http.listen; expected a port of its own";
+    assert_eq!(check(&LINK.replace("udpin:0.0.0.0:14550", "tcpin:0.0.0.0:8080"), &[]), refused(&[page]));
+}
+
+#[test]
+fn endpoints_say_what_is_wrong_with_them() {
+    for (endpoint, expected) in [
+        ("serial:/dev/ttyUSB0", "serial:PATH:BAUD, for example serial:/dev/ttyUSB0:115200"),
+        (
+            "udpout:gcs.local:14550",
+            "an IP address and a port behind the first colon, for example 127.0.0.1:14550 or [::1]:14550",
+        ),
+        ("udpout:10.0.0.1:0", "a port from 1 to 65535"),
+        ("tcp:10.0.0.1:1", "KIND:… with KIND one of serial, udpin, udpout, udpbcast, tcpin, tcpout"),
+    ] {
+        let outcome = check(&LINK.replace("udpin:0.0.0.0:14550", endpoint), &[]);
+        let line = format!("c.toml:4: link.ground.endpoint: found \"{endpoint}\"; expected {expected}");
+        assert_eq!(outcome, refused(&[&line]));
+    }
+}
+
+/// "mode 0600".
+#[test]
+fn a_token_that_others_can_read_is_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let token = folder.path().join("token");
+    let path = token.display();
+    let text = format!("[http]\ntoken_file = \"{path}\"\n");
+
+    // A token that is not there yet locks everybody out.
+    assert_eq!(check(&format!("{LINK}{text}"), &[]).code, Some(0));
+    fs::write(&token, "secret").expect("a writable folder");
+    for (mode, right) in [(0o600, true), (0o400, true), (0o640, false), (0o604, false), (0o666, false)] {
+        fs::set_permissions(&token, fs::Permissions::from_mode(mode)).expect("our own file");
+        if right {
+            assert_eq!(check(&format!("{LINK}{text}"), &[]).code, Some(0), "{mode:o}");
+        } else {
+            assert_refused(
+                &text,
+                &[&format!(
+                    "c.toml:6: http.token_file: found \"{path}\", which has mode {mode:04o}; expected a file that only its owner can read: chmod 0600"
+                )],
+            );
+        }
+    }
+    assert_refused(
+        "[http]\ntoken_file = \"token\"\n",
+        &[
+            "c.toml:6: http.token_file: found \"token\"; expected an absolute path as text, for example \"/etc/gimbald/http-token\"",
+        ],
+    );
+    assert_refused(
+        "[http]\nlisten = \"\"\n",
+        &[
+            "c.toml:6: http.listen: found \"\"; expected an IP address and a port as text, for example \"127.0.0.1:8080\"",
+        ],
+    );
+}
+
+#[test]
+fn a_wrong_variable_is_named() {
+    let variables = [
+        ("GIMBALD__CONTROL__FIREWALL", "maybe"),
+        ("GIMBALD__CONTROL__LEASE_TIMEOT_S", "1"),
+        ("GIMBALD__HTPP__LISTEN", "127.0.0.1:1"),
+        ("GIMBALD__LINK__GROUND__MAX_RATE_HZ", "{}"),
+        ("GIMBALD__LINK__GROUND__NAME", "sky"),
+        ("GIMBALD__LINK__GRUND__ENDPOINT", "udpin:0.0.0.0:1"),
+        ("GIMBALD__GIMBAL__CAMERA__TAKEOVER", "ask"),
+        ("GIMBALD__VEHICLE", "1"),
+        ("GIMBALD__VEHICLE__SYSTEM_ID", "300"),
+        ("GIMBALD_LOG", "no concern of ours"),
+    ];
+    const KINDS: &str = "GIMBALD__SECTION__KEY with VEHICLE, CONTROL, ROI or HTTP, or GIMBALD__LINK__NAME__KEY, or \
+                         GIMBALD__GIMBAL__NAME__KEY";
+    let lines = [
+        r#"GIMBALD__CONTROL__FIREWALL: control.firewall: found "maybe"; expected on or warn"#,
+        "GIMBALD__CONTROL__LEASE_TIMEOT_S: control.lease_timeot_s: unknown key; expected one of unclaimed, lease_timeout_s, rate_timeout_s, command_rate_timeout_s, firewall, snoop_autopilot, px4_release_quirk; did you mean lease_timeout_s?",
+        "GIMBALD__GIMBAL__CAMERA__TAKEOVER: no gimbal in the file; expected a variable of a gimbal that the file has",
+        &format!("GIMBALD__HTPP__LISTEN: an unknown variable; expected {KINDS}; did you mean GIMBALD__HTTP__?"),
+        "GIMBALD__LINK__GROUND__MAX_RATE_HZ: link.ground.max_rate_hz: a variable for a table; expected it to be set in the file",
+        "GIMBALD__LINK__GROUND__NAME: a variable for a name; expected names to be set in the file",
+        r#"GIMBALD__LINK__GRUND__ENDPOINT: no link named "grund" in the file; expected one of ground; did you mean ground?"#,
+        &format!("GIMBALD__VEHICLE: an unknown variable; expected {KINDS}"),
+        r#"GIMBALD__VEHICLE__SYSTEM_ID: vehicle.system_id: found "300"; expected "auto" or a whole number from 1 to 255"#,
+    ];
+    assert_eq!(check(LINK, &variables), refused(&lines));
+}
+
+/// `config::load` of a file with this text.
+fn load(text: &str, variables: &[(&str, &str)]) -> Result<DaemonSettings, Problems> {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("c.toml");
+    fs::write(&path, text).expect("a writable folder");
+    config::load(&path, variables.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())))
+}
+
+/// Every key, with another value than its default.
+const EVERY_KEY: &str = r#"
+[[link]]
+name = "nose"
+role = "gimbal"
+endpoint = "serial:/dev/ttyUSB0:57600"
+[[link]]
+name = "ground"
+role = "ground"
+endpoint = "udpbcast:10.0.0.255:14550"
+max_rate_hz = { 285 = 4, 281 = 0.5 }
+[[gimbal]]
+name = "nose-cam"
+link = "ground"
+family = "mavlink_v2"
+component_id = 171
+manager_component_id = 200
+takeover = "ask"
+setpoint_rate_hz = 30
+device_yaw_frame = "earth"
+manual_pitch_rate_dps = 12.5
+manual_yaw_rate_dps = 45
+[vehicle]
+system_id = 7
+[control]
+unclaimed = "closed"
+lease_timeout_s = 3
+rate_timeout_s = 0.5
+command_rate_timeout_s = 0
+firewall = "warn"
+snoop_autopilot = true
+px4_release_quirk = true
+[roi]
+altitude_reference = "amsl"
+[http]
+listen = "[::1]:9090"
+token_file = "/nowhere/token"
+"#;
+
+#[test]
+fn every_key_arrives_where_it_belongs() {
+    let link = |name: &str, role, endpoint: &str, transport, speaks_first, max_rates: &[(u32, u64)]| LinkSettings {
+        name: name.to_owned(),
+        role,
+        endpoint: endpoint.to_owned(),
+        transport,
+        speaks_first,
+        max_rates: max_rates.iter().map(|(id, millis)| (*id, Duration::from_millis(*millis))).collect(),
+    };
+    let (serial, broadcast) = ("serial:/dev/ttyUSB0:57600", "udpbcast:10.0.0.255:14550");
+    let expected = DaemonSettings {
+        core: Settings {
+            system_id: SystemId::Fixed(7),
+            stored_system_id: None,
+            links: vec![
+                link("nose", Role::Gimbal, serial, Transport::Serial { baud: 57_600 }, false, &[]),
+                link("ground", Role::Ground, broadcast, Transport::Datagrams, true, &[(281, 2000), (285, 250)]),
+            ],
+            gimbals: vec![GimbalSettings {
+                name: "nose-cam".to_owned(),
+                family: Family::MavlinkV2,
+                link: Some(1),
+                component_id: Some(171),
+                manager_component_id: Some(200),
+                takeover: Takeover::Ask,
+                setpoint_rate_hz: 30,
+                device_yaw_frame: DeviceYawFrame::Earth,
+                manual_pitch_rate_dps: 12.5,
+                manual_yaw_rate_dps: 45.0,
+            }],
+            control: ControlSettings {
+                open_when_unclaimed: false,
+                lease_timeout: Duration::from_secs(3),
+                rate_timeout: Duration::from_millis(500),
+                command_rate_timeout: Duration::ZERO,
+                firewall: Firewall::Warn,
+                snoop_autopilot: true,
+                px4_release_quirk: true,
+                roi_altitude: AltitudeReference::Amsl,
+            },
+        },
+        endpoints: vec![serial.parse().expect(serial), broadcast.parse().expect(broadcast)],
+        http: Some(HttpSettings {
+            listen: "[::1]:9090".parse().expect("an address"),
+            token_file: Some("/nowhere/token".into()),
+        }),
+        state_directory: Some("/var/lib/gimbald".into()),
+    };
+    assert_eq!(load(EVERY_KEY, &[("STATE_DIRECTORY", "/var/lib/gimbald:/var/lib/other")]), Ok(expected));
+}
+
+#[test]
+fn what_is_not_said_has_its_default() {
+    let loaded = load(LINK, &[("STATE_DIRECTORY", "")]).expect("a right file");
+
+    assert_eq!(loaded.core.system_id, SystemId::Auto);
+    assert_eq!(loaded.core.gimbals, []);
+    assert_eq!(loaded.core.control, ControlSettings::default());
+    let listen = "127.0.0.1:8080".parse().expect("an address");
+    assert_eq!(loaded.http, Some(HttpSettings { listen, token_file: None }));
+    assert_eq!(loaded.state_directory, None);
+
+    let loaded = load(&format!("{LINK}[[gimbal]]\nname = \"camera\"\n"), &[]).expect("a right file");
+    assert_eq!(loaded.core.gimbals, [GimbalSettings::found("camera".to_owned())]);
+}
+
+/// A link whose other end waits to be spoken to must send the first byte.
+#[test]
+fn links_that_call_speak_first() {
+    for (endpoint, transport, speaks_first) in [
+        ("serial:/dev/ttyUSB0:57600", Transport::Serial { baud: 57_600 }, false),
+        ("udpin:0.0.0.0:1", Transport::Datagrams, false),
+        ("udpout:10.0.0.1:1", Transport::Datagrams, true),
+        ("udpbcast:10.0.0.255:1", Transport::Datagrams, true),
+        ("tcpin:0.0.0.0:1", Transport::Stream, false),
+        ("tcpout:10.0.0.1:1", Transport::Stream, true),
+    ] {
+        let loaded = load(&LINK.replace("udpin:0.0.0.0:14550", endpoint), &[]).expect(endpoint);
+        let link = &loaded.core.links[0];
+        assert_eq!((link.transport, link.speaks_first), (transport, speaks_first), "{endpoint}");
+    }
+}
+
+/// Every key of every section is read from a variable as it is from the file.
+#[test]
+fn variables_override_the_file() {
+    let variables = [
+        ("GIMBALD__LINK__Ground__ROLE", "ground"),
+        ("GIMBALD__LINK__GROUND__ENDPOINT", "udpbcast:10.0.0.255:14550"),
+        ("GIMBALD__GIMBAL__NOSE_CAM__LINK", "ground"),
+        ("GIMBALD__GIMBAL__NOSE_CAM__FAMILY", "mavlink_v2"),
+        ("GIMBALD__GIMBAL__NOSE_CAM__COMPONENT_ID", "171"),
+        ("GIMBALD__GIMBAL__nose_cam__MANAGER_COMPONENT_ID", "200"),
+        ("GIMBALD__GIMBAL__NOSE-CAM__TAKEOVER", "ask"),
+        ("GIMBALD__GIMBAL__NOSE_CAM__SETPOINT_RATE_HZ", "30"),
+        ("GIMBALD__GIMBAL__NOSE_CAM__DEVICE_YAW_FRAME", "earth"),
+        ("GIMBALD__GIMBAL__NOSE_CAM__MANUAL_PITCH_RATE_DPS", "12.5"),
+        ("GIMBALD__GIMBAL__NOSE_CAM__MANUAL_YAW_RATE_DPS", "45"),
+        ("GIMBALD__VEHICLE__SYSTEM_ID", "7"),
+        ("GIMBALD__CONTROL__UNCLAIMED", "closed"),
+        ("GIMBALD__CONTROL__LEASE_TIMEOUT_S", "3"),
+        ("GIMBALD__CONTROL__RATE_TIMEOUT_S", "0.5"),
+        ("GIMBALD__CONTROL__COMMAND_RATE_TIMEOUT_S", "0"),
+        ("GIMBALD__CONTROL__FIREWALL", "warn"),
+        ("GIMBALD__CONTROL__SNOOP_AUTOPILOT", "true"),
+        ("GIMBALD__CONTROL__PX4_RELEASE_QUIRK", "true"),
+        ("GIMBALD__ROI__ALTITUDE_REFERENCE", "amsl"),
+        ("GIMBALD__HTTP__LISTEN", "[::1]:9090"),
+        ("GIMBALD__HTTP__TOKEN_FILE", "/nowhere/token"),
+    ];
+    let bare = r#"
+[[link]]
+name = "nose"
+role = "gimbal"
+endpoint = "serial:/dev/ttyUSB0:57600"
+[[link]]
+name = "ground"
+role = "peer"
+endpoint = "udpin:0.0.0.0:1"
+max_rate_hz = { 285 = 4, 281 = 0.5 }
+[[gimbal]]
+name = "nose-cam"
+takeover = "open"
+"#;
+
+    let from_file = load(EVERY_KEY, &[]).expect("a right file");
+    let from_variables = load(bare, &variables).expect("right variables");
+
+    assert_eq!(from_variables, from_file);
+    // Every key that a variable can set is in the list above.
+    let names: Vec<String> = variables.iter().map(|(name, _)| name.to_uppercase()).collect();
+    for (section, keys) in config::schema::keys() {
+        for key in keys.into_iter().filter(|key| !matches!(*key, "name" | "max_rate_hz")) {
+            let covered = names.iter().any(|name| {
+                name.starts_with(&format!("GIMBALD__{}__", section.to_uppercase()))
+                    && name.ends_with(&format!("__{}", key.to_uppercase()))
+            });
+            assert!(covered, "{section}.{key}");
+        }
+    }
+}

@@ -1,0 +1,11 @@
+//! Everything that is tested from outside the crate, as one binary.
+
+mod captures;
+mod configuration;
+mod conformance;
+mod dialect_oracle;
+mod gimbald;
+mod properties;
+mod shipped_files;
+mod structure;
+mod support;
