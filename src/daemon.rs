@@ -1,3 +1,12 @@
-//! The process around the core.
+//! The process around the core: clock, links, logging, state file, service manager, and the window that others see it
+//! through.
 
+mod channels;
+pub mod clock;
+mod event_loop;
 pub mod logging;
+pub mod shutdown;
+pub mod supervisor;
+mod system_id_file;
+mod systemd;
+pub mod window;

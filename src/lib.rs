@@ -3,6 +3,7 @@
 //! `docs/architecture.md` tells how the parts fit together.
 
 pub mod bridge;
+pub mod channel;
 pub mod cli;
 pub mod commands;
 pub mod config;
@@ -11,7 +12,9 @@ pub mod endpoint;
 pub mod exit_code;
 pub mod geometry;
 pub mod gimbals;
+pub mod links;
 pub mod manager;
+pub mod router;
 pub mod sim;
 pub mod timers;
 pub mod timestamp;

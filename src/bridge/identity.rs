@@ -1,0 +1,195 @@
+//! Which system id is ours.
+//!
+//! All components of a vehicle share the vehicle's system id (MAVLink developer guide, Component ids): a companion
+//! takes over the autopilot's. Only links of role `autopilot` are believed; behind a ground link other vehicles fly.
+
+use std::time::Duration;
+
+use super::settings::{FALLBACK_SYSTEM_ID, SystemId};
+use crate::timestamp::Timestamp;
+
+/// After the first autopilot heartbeat others get so long to be heard.
+pub const WINDOW: Duration = Duration::from_secs(3);
+
+/// Without any autopilot the fallback id is used after so long.
+pub const PATIENCE: Duration = Duration::from_secs(10);
+
+/// An autopilot not heard for so long is gone.
+const AUTOPILOT_LOST: Duration = Duration::from_secs(5);
+
+/// Decides the system id from the heartbeats of autopilots.
+#[derive(Debug)]
+pub struct Identity {
+    started: Timestamp,
+    fixed: bool,
+    system: Option<u8>,
+    /// The id is the fallback, used because nobody was heard.
+    bootstrap: bool,
+    /// Autopilot systems with the times of their first and latest heartbeat.
+    autopilots: Vec<(u8, Timestamp, Timestamp)>,
+}
+
+impl Identity {
+    pub fn new(now: Timestamp, wanted: SystemId, stored: Option<u8>) -> Self {
+        let (fixed, system) = match wanted {
+            SystemId::Fixed(system) => (true, Some(system)),
+            SystemId::Auto => (false, stored.filter(|system| *system != 0)),
+        };
+        Self { started: now, fixed, system, bootstrap: false, autopilots: Vec::new() }
+    }
+
+    /// Our system id, `None` until it is settled.
+    pub fn system(&self) -> Option<u8> {
+        self.system
+    }
+
+    /// Whether we run on the fallback id.
+    pub fn is_bootstrap(&self) -> bool {
+        self.bootstrap
+    }
+
+    /// The autopilot systems heard lately: more than one is a conflict under `system_id = "auto"`.
+    pub fn autopilots(&self, now: Timestamp) -> impl Iterator<Item = u8> + '_ {
+        self.autopilots.iter().filter(move |(_, _, latest)| now.since(*latest) < AUTOPILOT_LOST).map(|(id, ..)| *id)
+    }
+
+    /// An autopilot of `system` beat on an autopilot link.
+    pub fn handle_autopilot(&mut self, now: Timestamp, system: u8) {
+        if system == 0 {
+            return;
+        }
+        match self.autopilots.iter_mut().find(|(id, ..)| *id == system) {
+            Some((_, first, latest)) => {
+                if now.since(*latest) >= AUTOPILOT_LOST {
+                    *first = now;
+                }
+                *latest = now;
+            }
+            None => {
+                if self.autopilots.len() >= 16 {
+                    self.autopilots.retain(|(_, _, latest)| now.since(*latest) < AUTOPILOT_LOST);
+                }
+                if self.autopilots.len() < 16 {
+                    self.autopilots.push((system, now, now));
+                }
+            }
+        }
+    }
+
+    /// When the id may settle or change.
+    pub fn poll_timeout(&self) -> Option<Timestamp> {
+        if self.fixed {
+            return None;
+        }
+        let window = self.autopilots.iter().map(|(_, first, _)| *first + WINDOW);
+        match self.system {
+            None => window.chain([self.started + PATIENCE]).min(),
+            Some(_) => None,
+        }
+    }
+
+    /// Settles or changes the id if it is time; true when it did. `held` tells that a client is in control, when
+    /// nothing may change under it.
+    pub fn update(&mut self, now: Timestamp, held: bool) -> bool {
+        if self.fixed {
+            return false;
+        }
+        let before = self.system;
+        let alive: Vec<u8> = self.autopilots(now).collect();
+        let only = if let [system] = alive[..] { Some(system) } else { None };
+        let watched =
+            self.autopilots.iter().map(|(_, first, _)| *first).min().is_some_and(|at| now.since(at) >= WINDOW);
+        match self.system {
+            None if watched && !alive.is_empty() => self.settle(only.unwrap_or(FALLBACK_SYSTEM_ID), false),
+            None if now.since(self.started) >= PATIENCE => self.settle(FALLBACK_SYSTEM_ID, true),
+            Some(ours) if !held => {
+                // Another id only when its autopilot alone has been heard for the whole window.
+                let other = self.autopilots.iter().find(|(id, first, latest)| {
+                    Some(*id) == only && now.since(*first) >= WINDOW && now.since(*latest) < AUTOPILOT_LOST
+                });
+                match other.map(|(id, ..)| *id) {
+                    Some(id) if id == ours => self.bootstrap = false,
+                    Some(id) => self.settle(id, false),
+                    None => {}
+                }
+            }
+            _ => {}
+        }
+        self.system != before
+    }
+
+    fn settle(&mut self, system: u8, bootstrap: bool) {
+        self.system = Some(system);
+        self.bootstrap = bootstrap;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Protocol checklist 15: "exactly one autopilot system (say 7) beats for 3 s": its id is ours.
+    #[test]
+    fn the_only_autopilot_gives_its_id_after_the_window() {
+        let mut identity = auto();
+        for second in 1..=3 {
+            identity.handle_autopilot(secs(second), 7);
+            assert!(!identity.update(secs(second), false));
+        }
+        identity.handle_autopilot(secs(4), 7);
+        assert_eq!(identity.poll_timeout(), Some(secs(4)));
+        assert!(identity.update(secs(4), false));
+        assert_eq!((identity.system(), identity.is_bootstrap()), (Some(7), false));
+    }
+
+    /// Protocol checklist 16: "two autopilot systems beat within the 3 s window": neither is taken.
+    #[test]
+    fn of_two_autopilots_none_is_taken() {
+        let mut identity = auto();
+        identity.handle_autopilot(secs(1), 7);
+        identity.handle_autopilot(secs(2), 8);
+        assert!(identity.update(secs(4), false));
+        assert_eq!(identity.system(), Some(FALLBACK_SYSTEM_ID));
+    }
+
+    /// Protocol checklist 14, and "adopt a different id later only while no client is in control".
+    #[test]
+    fn the_fallback_gives_way_to_a_late_autopilot_unless_somebody_steers() {
+        let mut identity = auto();
+        assert!(!identity.update(Timestamp::from_millis(9_999), false));
+        assert!(identity.update(secs(10), false));
+        assert_eq!((identity.system(), identity.is_bootstrap()), (Some(1), true));
+        for second in 20..=23 {
+            identity.handle_autopilot(secs(second), 7);
+        }
+        assert!(!identity.update(secs(23), true));
+        assert!(identity.update(secs(23), false));
+        assert_eq!((identity.system(), identity.is_bootstrap()), (Some(7), false));
+    }
+
+    /// D19: a stored id is used at once; the window only confirms it.
+    #[test]
+    fn a_stored_id_is_used_at_once() {
+        let mut identity = Identity::new(Timestamp::ZERO, SystemId::Auto, Some(7));
+        assert_eq!(identity.system(), Some(7));
+        identity.handle_autopilot(secs(1), 7);
+        assert!(!identity.update(secs(4), false));
+        assert_eq!(identity.system(), Some(7));
+    }
+
+    #[test]
+    fn a_fixed_id_never_changes() {
+        let mut identity = Identity::new(Timestamp::ZERO, SystemId::Fixed(42), Some(7));
+        identity.handle_autopilot(secs(1), 7);
+        assert!(!identity.update(secs(20), false));
+        assert_eq!((identity.system(), identity.poll_timeout()), (Some(42), None));
+    }
+
+    fn auto() -> Identity {
+        Identity::new(Timestamp::ZERO, SystemId::Auto, None)
+    }
+
+    fn secs(secs: u64) -> Timestamp {
+        Timestamp::from_secs(secs)
+    }
+}

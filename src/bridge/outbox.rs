@@ -1,0 +1,44 @@
+//! What is to be sent, in order, without an allocation per frame.
+
+use std::collections::VecDeque;
+
+use super::Output;
+use crate::channel::ChannelSet;
+
+/// Frames that wait for [`poll_output`](super::Bridge::poll_output), their bytes side by side in one buffer.
+#[derive(Debug, Default)]
+pub struct Outbox {
+    bytes: Vec<u8>,
+    entries: VecDeque<Entry>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Entry {
+    Frame { channels: ChannelSet, start: usize, end: usize },
+    StoreSystemId(u8),
+}
+
+impl Outbox {
+    pub fn push_frame(&mut self, channels: ChannelSet, bytes: &[u8]) {
+        if channels.is_empty() {
+            return;
+        }
+        if self.entries.is_empty() {
+            self.bytes.clear();
+        }
+        let start = self.bytes.len();
+        self.bytes.extend_from_slice(bytes);
+        self.entries.push_back(Entry::Frame { channels, start, end: self.bytes.len() });
+    }
+
+    pub fn push_system_id(&mut self, system: u8) {
+        self.entries.push_back(Entry::StoreSystemId(system));
+    }
+
+    pub fn pop(&mut self) -> Option<Output<'_>> {
+        Some(match self.entries.pop_front()? {
+            Entry::Frame { channels, start, end } => Output::Transmit { channels, bytes: &self.bytes[start..end] },
+            Entry::StoreSystemId(system) => Output::StoreSystemId(system),
+        })
+    }
+}

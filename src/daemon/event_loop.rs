@@ -1,0 +1,239 @@
+//! The one loop that carries bytes between the links and the core.
+//!
+//! One future polls everything: no task per link, no queue between tasks, no allocation per frame. At each wake-up
+//! every link hands over one bounded batch, what the core answers is collected by the links, and leaves with one
+//! system call per link.
+
+use std::io;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+
+use tokio::sync::{mpsc, watch};
+
+use super::channels::ChannelTable;
+use super::clock::{Clock, DeadlineTimer};
+use super::shutdown::Shutdown;
+use super::system_id_file::SystemIdFile;
+use super::systemd::ServiceManager;
+use super::window::CoreRequest;
+use crate::bridge::snapshot::Snapshot;
+use crate::bridge::{Bridge, Input, LinkIndex, Output};
+use crate::links::inbox::{Event, Inbox, PeerIndex};
+use crate::links::{Link, Progress};
+use crate::timestamp::Timestamp;
+
+pub struct EventLoop {
+    clock: Clock,
+    timer: DeadlineTimer,
+    core: Bridge,
+    ports: Ports,
+    inbox: Inbox,
+    shutdown: Shutdown,
+    service_manager: ServiceManager,
+    window: Window,
+    started: bool,
+}
+
+/// The core's ends of [`super::window::CoreHandle`].
+pub struct Window {
+    pub requests: mpsc::Receiver<CoreRequest>,
+    pub snapshots: watch::Sender<Arc<Snapshot>>,
+}
+
+/// Where the core's output goes.
+struct Ports {
+    links: Vec<Box<dyn Link>>,
+    channels: ChannelTable,
+    states: Vec<LinkState>,
+    system_id_file: SystemIdFile,
+}
+
+/// What is known of a link, so that only changes are told.
+struct LinkState {
+    name: String,
+    state: State,
+    refusal_told: bool,
+}
+
+#[derive(PartialEq)]
+enum State {
+    Unknown,
+    Up,
+    Down(String),
+}
+
+impl EventLoop {
+    #[expect(clippy::too_many_arguments, reason = "it is where everything meets")]
+    pub fn new(
+        core: Bridge,
+        links: Vec<Box<dyn Link>>,
+        names: Vec<String>,
+        clock: Clock,
+        timer: DeadlineTimer,
+        shutdown: Shutdown,
+        service_manager: ServiceManager,
+        system_id_file: SystemIdFile,
+        window: Window,
+    ) -> Self {
+        let channels = ChannelTable::new(links.len());
+        let states =
+            names.into_iter().map(|name| LinkState { name, state: State::Unknown, refusal_told: false }).collect();
+        let ports = Ports { links, channels, states, system_id_file };
+        let inbox = Inbox::default();
+        Self { clock, timer, core, ports, inbox, shutdown, service_manager, window, started: false }
+    }
+
+    /// Does what there is to do; ready when the process is to end.
+    pub fn poll(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        let now = self.clock.now();
+        self.timer.poll(cx)?;
+        if self.shutdown.poll(now, cx) {
+            tracing::info!("stopping");
+            self.service_manager.stopping();
+            self.input(now, Input::Shutdown);
+        }
+        if self.core.poll_timeout().is_some_and(|at| now >= at) {
+            self.core.handle_timeout(now);
+            self.ports.carry_out(&mut self.core);
+        }
+        let mut more = false;
+        for link in 0..self.ports.links.len() {
+            more |= self.poll_link(now, link, cx);
+        }
+        for link in &mut self.ports.links {
+            link.flush(now);
+        }
+        self.poll_window(now, cx);
+        self.serve_service_manager(now);
+        if self.is_finished(now) {
+            return Poll::Ready(Ok(()));
+        }
+        match self.deadline() {
+            _ if more => cx.waker().wake_by_ref(),
+            Some(at) if at <= now => cx.waker().wake_by_ref(),
+            Some(at) => self.timer.wake_by(at, &self.clock)?,
+            None => {}
+        }
+        Poll::Pending
+    }
+
+    /// Hands what one link received to the core; whether the link has more.
+    fn poll_link(&mut self, now: Timestamp, link: LinkIndex, cx: &mut Context<'_>) -> bool {
+        self.inbox.clear();
+        let progress = self.ports.links[link].poll(now, cx, &mut self.inbox);
+        for index in 0..self.inbox.len() {
+            self.ports.hand_over(now, link, self.inbox.event(index), &mut self.core);
+        }
+        progress == Progress::More
+    }
+
+    fn input(&mut self, now: Timestamp, input: Input<'_>) {
+        self.core.handle_input(now, input);
+        self.ports.carry_out(&mut self.core);
+    }
+
+    fn poll_window(&mut self, now: Timestamp, cx: &mut Context<'_>) {
+        while let Poll::Ready(Some(request)) = self.window.requests.poll_recv(cx) {
+            match request {
+                CoreRequest::Refresh => {
+                    self.window.snapshots.send_replace(Arc::new(self.core.snapshot(now)));
+                }
+            }
+        }
+    }
+
+    fn serve_service_manager(&mut self, now: Timestamp) {
+        if !self.started {
+            self.started = true;
+            self.service_manager.ready();
+        }
+        let up = self.ports.states.iter().filter(|link| link.state == State::Up).count();
+        self.service_manager.links_up(up, self.ports.states.len());
+        self.service_manager.feed_watchdog(now);
+    }
+
+    fn is_finished(&self, now: Timestamp) -> bool {
+        self.shutdown.leave_at().is_some_and(|at| {
+            now >= at || self.core.is_finished() && !self.ports.links.iter().any(|link| link.has_unsent())
+        })
+    }
+
+    fn deadline(&self) -> Option<Timestamp> {
+        let links = self.ports.links.iter().filter_map(|link| link.poll_timeout());
+        let others = [self.core.poll_timeout(), self.service_manager.poll_timeout(), self.shutdown.leave_at()];
+        links.chain(others.into_iter().flatten()).min()
+    }
+}
+
+impl Ports {
+    /// Does everything that the core wants done.
+    fn carry_out(&mut self, core: &mut Bridge) {
+        while let Some(output) = core.poll_output() {
+            match output {
+                Output::Transmit { channels, bytes } => {
+                    for (link, peers) in self.channels.by_link(channels) {
+                        self.links[link].send(peers, bytes);
+                    }
+                }
+                Output::StoreSystemId(id) => self.system_id_file.store(id),
+            }
+        }
+    }
+
+    fn input(&mut self, now: Timestamp, input: Input<'_>, core: &mut Bridge) {
+        core.handle_input(now, input);
+        self.carry_out(core);
+    }
+
+    fn hand_over(&mut self, now: Timestamp, link: LinkIndex, event: Event<'_>, core: &mut Bridge) {
+        match event {
+            Event::Received { peer, bytes } => {
+                if let Some(channel) = self.channels.channel(link, peer) {
+                    self.input(now, Input::Received { channel, bytes }, core);
+                }
+            }
+            Event::SendFailed { peer, frames, reason } => {
+                if let Some(channel) = self.channels.channel(link, peer) {
+                    self.input(now, Input::SendFailed { channel, frames, reason }, core);
+                }
+            }
+            Event::PeerAppeared { peer, address } => self.peer_appeared(now, link, peer, address, core),
+            Event::PeerLeft { peer } => {
+                if let Some(channel) = self.channels.close(link, peer) {
+                    tracing::info!(link = self.states[link].name, %channel, "peer left");
+                    self.input(now, Input::ChannelClosed { channel }, core);
+                }
+            }
+            Event::Up => {
+                self.states[link].state = State::Up;
+                tracing::info!(link = self.states[link].name, "link up");
+                self.input(now, Input::LinkUp { link }, core);
+            }
+            Event::Down { reason } => {
+                for channel in self.channels.close_all(link) {
+                    self.input(now, Input::ChannelClosed { channel }, core);
+                }
+                if !matches!(&self.states[link].state, State::Down(known) if known == reason) {
+                    self.states[link].state = State::Down(reason.to_owned());
+                    tracing::warn!(link = self.states[link].name, reason, "link down");
+                    self.input(now, Input::LinkDown { link, reason }, core);
+                }
+            }
+        }
+    }
+
+    fn peer_appeared(&mut self, now: Timestamp, link: LinkIndex, peer: PeerIndex, address: &str, core: &mut Bridge) {
+        match self.channels.open(link, peer) {
+            Some(channel) => {
+                tracing::info!(link = self.states[link].name, address, %channel, "peer appeared");
+                self.input(now, Input::ChannelOpened { channel, link, address }, core);
+            }
+            None => {
+                if !std::mem::replace(&mut self.states[link].refusal_told, true) {
+                    tracing::warn!(link = self.states[link].name, address, "too many peers, newcomers are ignored");
+                }
+                self.links[link].refuse(peer);
+            }
+        }
+    }
+}

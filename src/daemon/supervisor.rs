@@ -1,0 +1,84 @@
+//! Puts the daemon together, and runs it until it is asked to end.
+
+use std::future::poll_fn;
+use std::io;
+use std::sync::Arc;
+use std::thread;
+use std::time::Duration;
+
+use tokio::sync::{mpsc, watch};
+
+use super::clock::{Clock, DeadlineTimer};
+use super::event_loop::{EventLoop, Window};
+use super::shutdown::Shutdown;
+use super::system_id_file::SystemIdFile;
+use super::systemd::ServiceManager;
+use super::window::CoreHandle;
+use crate::bridge::Bridge;
+use crate::config::settings::{DaemonSettings, HttpSettings};
+use crate::links;
+
+/// Requests that may wait; whoever asks for more waits.
+const REQUESTS: usize = 16;
+/// How long a file that is being written may hold up the end.
+const FILE_PATIENCE: Duration = Duration::from_millis(200);
+
+/// Why the daemon could not start, or not go on.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    #[error("the event loop could not be started")]
+    Runtime(#[source] io::Error),
+    #[error("the signals that end the process could not be caught")]
+    Signals(#[source] io::Error),
+    #[error("the timer failed")]
+    Timer(#[source] io::Error),
+    #[error("the thread that serves HTTP could not be started")]
+    HttpThread(#[source] io::Error),
+}
+
+/// Runs until SIGTERM or SIGINT.
+///
+/// `serve_http` runs on a thread of its own, so that no page ever holds up a frame; what becomes of it does not
+/// concern the core.
+pub fn run(
+    settings: DaemonSettings,
+    serve_http: impl FnOnce(HttpSettings, CoreHandle) + Send + 'static,
+) -> Result<(), RunError> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_io().build().map_err(RunError::Runtime)?;
+    let result = runtime.block_on(async {
+        let mut event_loop = assemble(settings, serve_http)?;
+        poll_fn(|cx| event_loop.poll(cx)).await.map_err(RunError::Timer)
+    });
+    runtime.shutdown_timeout(FILE_PATIENCE);
+    result
+}
+
+fn assemble(
+    settings: DaemonSettings,
+    serve_http: impl FnOnce(HttpSettings, CoreHandle) + Send + 'static,
+) -> Result<EventLoop, RunError> {
+    // Signals first: whoever ends us while we start gets a goodbye too.
+    let shutdown = Shutdown::new().map_err(RunError::Signals)?;
+    let timer = DeadlineTimer::new().map_err(RunError::Timer)?;
+    let clock = Clock::start();
+
+    let system_id_file = SystemIdFile::new(settings.state_directory);
+    let mut core_settings = settings.core;
+    core_settings.stored_system_id = core_settings.stored_system_id.or_else(|| system_id_file.read());
+    let names = core_settings.links.iter().map(|link| link.name.clone()).collect();
+    let core = Bridge::new(clock.now(), core_settings);
+
+    let (requests, received_requests) = mpsc::channel(REQUESTS);
+    let (published, snapshots) = watch::channel(Arc::new(core.snapshot(clock.now())));
+    if let Some(http) = settings.http {
+        let handle = CoreHandle { requests, snapshots };
+        thread::Builder::new()
+            .name("http".to_owned())
+            .spawn(move || serve_http(http, handle))
+            .map_err(RunError::HttpThread)?;
+    }
+
+    let links = settings.endpoints.iter().map(links::link).collect();
+    let window = Window { requests: received_requests, snapshots: published };
+    Ok(EventLoop::new(core, links, names, clock, timer, shutdown, ServiceManager::new(), system_id_file, window))
+}

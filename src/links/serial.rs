@@ -1,0 +1,402 @@
+//! `serial`: a serial port or pseudo-terminal, which may go and come back at any time.
+
+use std::io::{self, Read, Write};
+use std::task::{Context, Poll};
+use std::time::Duration;
+
+use mio_serial::{ClearBuffer, SerialPort, SerialStream};
+use tokio::io::unix::AsyncFd;
+
+use super::backoff::Backoff;
+use super::frame_queue::FrameQueue;
+use super::inbox::{Inbox, PeerIndex, PeerSet};
+use super::input_ready::watch_input;
+use super::send_failures::SendFailures;
+use super::{Link, Progress, cause};
+use crate::timestamp::Timestamp;
+
+const PEER: PeerIndex = 0;
+/// What may wait for a line that was thought to be free: two long frames. More would arrive too late to be of use.
+const OUTPUT_LIMIT: usize = 600;
+/// Frames that wait longer are dropped, unless they are partly on the line.
+const STALL_LIMIT: Duration = Duration::from_secs(1);
+/// How often a line that took nothing is tried again.
+const RETRY_INTERVAL: Duration = Duration::from_millis(5);
+/// What the terminal layer hands out at a time.
+const READ_LENGTH: usize = 4096;
+/// Reads in one batch.
+const READS: usize = 4;
+
+/// Opened by its configured path, again and again, because the device behind it may be another after it came back.
+pub struct SerialLink {
+    path: String,
+    baud: u32,
+    state: State,
+    backoff: Backoff,
+    failures: SendFailures,
+}
+
+enum State {
+    Closed { retry_at: Timestamp },
+    Open(Port),
+}
+
+struct Port {
+    /// Waits for input only: drivers report room for output after every frame, and each report would wake the event
+    /// loop. The pace is kept by the core, so that there nearly always is room.
+    device: AsyncFd<SerialStream>,
+    output: FrameQueue,
+    retry_at: Option<Timestamp>,
+    failure: Option<io::Error>,
+}
+
+impl SerialLink {
+    pub fn new(path: String, baud: u32) -> Self {
+        Self {
+            path,
+            baud,
+            state: State::Closed { retry_at: Timestamp::ZERO },
+            backoff: Backoff::for_devices(),
+            failures: SendFailures::default(),
+        }
+    }
+
+    fn open(&mut self, now: Timestamp, inbox: &mut Inbox) {
+        match Port::open(&self.path, self.baud) {
+            Ok(port) => {
+                self.state = State::Open(port);
+                inbox.up();
+                inbox.peer_appeared(PEER, self.path.clone());
+            }
+            Err(error) => {
+                self.state = State::Closed { retry_at: self.backoff.failed(now) };
+                inbox.down(format!("cannot open {}: {}", self.path, cause(&error)));
+            }
+        }
+    }
+}
+
+impl Port {
+    fn open(path: &str, baud: u32) -> io::Result<Self> {
+        // Opens for itself alone (`TIOCEXCL` and a lock) and without blocking.
+        let device = SerialStream::open(&mio_serial::new(path, baud))?;
+        // What came in while nobody listened is stale.
+        device.clear(ClearBuffer::Input)?;
+        Ok(Self { device: watch_input(device)?, output: FrameQueue::new(OUTPUT_LIMIT), retry_at: None, failure: None })
+    }
+
+    fn poll(&mut self, cx: &mut Context<'_>, inbox: &mut Inbox) -> io::Result<Progress> {
+        for _ in 0..READS {
+            let Some(buffer) = inbox.buffer() else { return Ok(Progress::More) };
+            let mut ready = match self.device.poll_read_ready(cx) {
+                Poll::Pending => return Ok(Progress::Idle),
+                Poll::Ready(ready) => ready?,
+            };
+            match ready.get_inner().read(&mut buffer[..READ_LENGTH]) {
+                Ok(0) => return Err(io::Error::new(io::ErrorKind::UnexpectedEof, "the device is gone")),
+                Ok(length) => {
+                    // Fewer bytes than asked for means that there are no more.
+                    if length < READ_LENGTH {
+                        ready.clear_ready();
+                    }
+                    inbox.received(PEER, length);
+                }
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => ready.clear_ready(),
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(Progress::More)
+    }
+
+    fn flush(&mut self, now: Timestamp) {
+        if self.output.is_empty() {
+            return;
+        }
+        let device = self.device.get_ref();
+        if let Err(error) = self.output.write(now, |bytes| (&*device).write(bytes)) {
+            self.failure = Some(error);
+        }
+        self.retry_at = self.output.stalled_since().map(|_| now + RETRY_INTERVAL);
+    }
+
+    fn retry(&mut self, now: Timestamp, failures: &mut SendFailures) {
+        if self.retry_at.is_some_and(|at| now >= at) {
+            self.flush(now);
+        }
+        if self.output.stalled_since().is_some_and(|since| now.since(since) >= STALL_LIMIT) {
+            failures.note(PEER, self.output.drop_unbegun(), "the line takes nothing");
+        }
+    }
+}
+
+impl Drop for Port {
+    fn drop(&mut self) {
+        // Closing waits, for up to 30 s with some drivers, until a line that takes nothing has taken what is left.
+        if (self.failure.is_some() || self.output.stalled_since().is_some())
+            && let Err(error) = self.device.get_ref().clear(ClearBuffer::Output)
+        {
+            tracing::debug!(%error, "the output of a lost device could not be dropped");
+        }
+    }
+}
+
+impl Link for SerialLink {
+    fn poll(&mut self, now: Timestamp, cx: &mut Context<'_>, inbox: &mut Inbox) -> Progress {
+        if let State::Closed { retry_at } = &self.state
+            && now >= *retry_at
+        {
+            self.open(now, inbox);
+        }
+        let State::Open(port) = &mut self.state else { return Progress::Idle };
+        port.retry(now, &mut self.failures);
+        self.failures.report(inbox);
+        let result = match port.failure.take() {
+            Some(error) => Err(error),
+            None => port.poll(cx, inbox),
+        };
+        match result {
+            Ok(progress) => progress,
+            Err(error) => {
+                let reason = format!("lost {}: {}", self.path, cause(&error));
+                port.failure = Some(error);
+                inbox.send_failed(PEER, port.output.frames(), "the device is gone");
+                self.state = State::Closed { retry_at: self.backoff.failed(now) };
+                inbox.down(reason);
+                Progress::Idle
+            }
+        }
+    }
+
+    fn poll_timeout(&self) -> Option<Timestamp> {
+        match &self.state {
+            State::Closed { retry_at } => Some(*retry_at),
+            State::Open(Port { failure: Some(_), .. }) => Some(Timestamp::ZERO),
+            State::Open(port) => port.retry_at,
+        }
+    }
+
+    fn send(&mut self, _peers: PeerSet, frame: &[u8]) {
+        if let State::Open(port) = &mut self.state
+            && !port.output.push(frame)
+        {
+            self.failures.note(PEER, 1, "the line takes nothing");
+        }
+    }
+
+    fn flush(&mut self, now: Timestamp) {
+        if let State::Open(port) = &mut self.state {
+            port.flush(now);
+        }
+    }
+
+    fn has_unsent(&self) -> bool {
+        matches!(&self.state, State::Open(port) if !port.output.is_empty())
+    }
+
+    fn refuse(&mut self, _peer: PeerIndex) {
+        // The link has one peer for ever; without a channel nothing is sent to it, and it is asked for nothing.
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::File;
+    use std::os::fd::AsFd;
+    use std::os::unix::fs::symlink;
+    use std::path::{Path, PathBuf};
+
+    use nix::fcntl::{FcntlArg, OFlag, fcntl};
+    use nix::pty::{OpenptyResult, openpty};
+    use nix::unistd::ttyname;
+
+    use super::super::harness::{Rig, Seen, noise, read_available, write_aside};
+    use super::*;
+
+    /// A pseudo-terminal that can be pulled and plugged in again behind a path that stays.
+    struct Cable {
+        directory: tempfile::TempDir,
+        device: Option<File>,
+    }
+
+    impl Cable {
+        fn unplugged() -> Self {
+            Self { directory: tempfile::tempdir().expect("a directory"), device: None }
+        }
+
+        fn plugged() -> Self {
+            let mut cable = Self::unplugged();
+            cable.plug();
+            cable
+        }
+
+        fn path(&self) -> PathBuf {
+            self.directory.path().join("by-id:gimbal")
+        }
+
+        fn plug(&mut self) -> &mut File {
+            let OpenptyResult { master, slave } = openpty(None, None).expect("a pseudo-terminal");
+            fcntl(master.as_fd(), FcntlArg::F_SETFL(OFlag::O_NONBLOCK)).expect("it takes the flag");
+            symlink(ttyname(slave.as_fd()).expect("it has a name"), self.path()).expect("the path is free");
+            self.device.insert(master.into())
+        }
+
+        fn pull(&mut self) {
+            self.device = None;
+            std::fs::remove_file(self.path()).expect("it was there");
+        }
+
+        fn device(&mut self) -> &mut File {
+            self.device.as_mut().expect("it is plugged")
+        }
+    }
+
+    fn rig(path: &Path) -> Rig<SerialLink> {
+        Rig::new(SerialLink::new(path.to_str().expect("plain letters").to_owned(), 115_200))
+    }
+
+    #[track_caller]
+    fn expect_up(rig: &mut Rig<SerialLink>, path: &Path) {
+        assert_eq!(rig.next(), Seen::Up);
+        assert_eq!(rig.next(), Seen::Appeared(PEER, path.display().to_string()));
+    }
+
+    #[test]
+    fn bytes_go_both_ways_unchanged() {
+        let mut cable = Cable::plugged();
+        let mut rig = rig(&cable.path());
+        expect_up(&mut rig, &cable.path());
+        let all: Vec<u8> = (0..=255).collect();
+
+        cable.device().write_all(&all).expect("sent");
+        assert_eq!(rig.receive(PEER, 256), all);
+        rig.send(PEER, &all);
+        let mut arrived = Vec::new();
+        rig.until(|_| {
+            read_available(cable.device(), &mut arrived);
+            (arrived.len() >= 256).then_some(())
+        });
+        assert_eq!(arrived, all);
+    }
+
+    /// "a missing device at start is not fatal", and it is looked for every 250 ms.
+    #[test]
+    fn a_device_that_is_missing_at_start_is_waited_for() {
+        let mut cable = Cable::unplugged();
+        let mut rig = rig(&cable.path());
+        for _ in 0..3 {
+            let reason = format!("cannot open {}: no such file or directory", cable.path().display());
+            assert_eq!(rig.next(), Seen::Down(reason));
+            assert_eq!(rig.link.poll_timeout(), Some(rig.now + Duration::from_millis(250)));
+            rig.expect_silence();
+            rig.pass(Duration::from_millis(250));
+        }
+        rig.next();
+
+        cable.plug();
+        rig.pass(Duration::from_millis(250));
+        expect_up(&mut rig, &cable.path());
+    }
+
+    /// "serial device gone and back: noticed and recovered under 1 s after it returns".
+    #[test]
+    fn a_device_that_was_pulled_comes_back() {
+        let mut cable = Cable::plugged();
+        let mut rig = rig(&cable.path());
+        expect_up(&mut rig, &cable.path());
+        for _ in 0..5 {
+            cable.pull();
+            let Seen::Down(reason) = rig.next() else { panic!("it is noticed without time passing") };
+            assert!(reason.starts_with(&format!("lost {}: ", cable.path().display())), "{reason}");
+
+            cable.plug();
+            rig.pass(Duration::from_millis(250));
+            expect_up(&mut rig, &cable.path());
+            cable.device().write_all(b"back").expect("sent");
+            assert_eq!(rig.receive(PEER, 4), b"back");
+        }
+    }
+
+    #[test]
+    fn what_came_before_the_link_was_open_is_not_delivered() {
+        let mut cable = Cable::plugged();
+        let keeps_it_open = File::options().read(true).write(true).open(cable.path()).expect("it is there");
+        cable.device().write_all(b"stale\n").expect("sent");
+
+        let mut rig = rig(&cable.path());
+        expect_up(&mut rig, &cable.path());
+        cable.device().write_all(b"fresh").expect("sent");
+
+        assert_eq!(rig.receive(PEER, 5), b"fresh");
+        drop(keeps_it_open);
+    }
+
+    #[test]
+    fn a_device_that_another_process_holds_is_waited_for() {
+        let cable = Cable::plugged();
+        let mut holder = rig(&cable.path());
+        expect_up(&mut holder, &cable.path());
+
+        let mut second = rig(&cable.path());
+        let Seen::Down(reason) = second.next() else { panic!("it is held by the first") };
+        assert!(reason.starts_with(&format!("cannot open {}: ", cable.path().display())), "{reason}");
+        drop(holder);
+        second.pass(Duration::from_millis(250));
+        expect_up(&mut second, &cable.path());
+    }
+
+    /// "whole frames only": a line that takes a part of a frame gets the rest of it before anything else.
+    #[test]
+    fn a_frame_that_was_begun_is_finished_and_others_are_dropped_whole() {
+        let mut cable = Cable::plugged();
+        let mut rig = rig(&cable.path());
+        expect_up(&mut rig, &cable.path());
+        let frame = |number: u32| number.to_le_bytes().repeat(70);
+
+        let mut sent = 0;
+        while !rig.link.has_unsent() {
+            rig.send(PEER, &frame(sent));
+            sent += 1;
+        }
+        while sent < 200 {
+            rig.send(PEER, &frame(sent));
+            sent += 1;
+        }
+        let Seen::SendFailed(PEER, full, "the line takes nothing") = rig.next() else { panic!("some were dropped") };
+        rig.pass(Duration::from_secs(1));
+        let late = match rig.poll_once() {
+            Some(Seen::SendFailed(PEER, late, "the line takes nothing")) => late,
+            other => panic!("what waited a second is dropped: {other:?}"),
+        };
+        let mut arrived = Vec::new();
+        rig.until(|rig| {
+            rig.pass(RETRY_INTERVAL);
+            read_available(cable.device(), &mut arrived);
+            (!rig.link.has_unsent()).then_some(())
+        });
+        rig.send(PEER, &frame(sent));
+        let expected = (sent + 1 - full - late) as usize;
+        rig.until(|_| {
+            read_available(cable.device(), &mut arrived);
+            (arrived.len() >= expected * 280).then_some(())
+        });
+
+        let frames: Vec<_> = arrived.chunks(280).map(<[u8]>::to_vec).collect();
+        let numbers = (0..expected as u32 - 1).chain([sent]);
+        assert_eq!(frames, numbers.map(frame).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn ten_megabytes_pass_without_growth() {
+        let mut cable = Cable::plugged();
+        let mut rig = rig(&cable.path());
+        expect_up(&mut rig, &cable.path());
+        let device = cable.device.take().expect("it is plugged");
+        fcntl(device.as_fd(), FcntlArg::F_SETFL(OFlag::empty())).expect("it takes the flag");
+        let bytes = noise(10_000_000);
+        let writer = write_aside(device, bytes.clone());
+
+        assert!(rig.receive(PEER, bytes.len()) == bytes, "what arrives is what was sent");
+        writer.join().expect("all was written");
+    }
+}
