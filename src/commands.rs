@@ -1,3 +1,5 @@
 //! One module for each command: what it does with its arguments, and how it ends.
 
 pub mod check;
+pub mod demo;
+pub mod sim;
