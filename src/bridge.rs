@@ -3,13 +3,39 @@
 //! **One input, then [`Bridge::poll_output`] until it is `None`, then the next input.** Time never goes backwards and
 //! only comes in as `now`.
 
+mod channels;
+mod conflicts;
+mod delivery;
+mod heartbeat;
 mod identity;
 mod outbox;
 pub mod pacing;
+mod picture;
+mod roster;
+mod sent;
 pub mod settings;
 pub mod snapshot;
+mod streams;
 
 pub use crate::channel::{ChannelId, ChannelSet};
+use crate::gimbals::DriverOutput;
+use crate::gimbals::mavlink_v2::packet;
+use crate::manager::{ManagerOutput, Surroundings, messages};
+use crate::router::Router;
+use crate::timers::TimerTable;
+use crate::timestamp::Timestamp;
+use crate::vehicle::Vehicle;
+use crate::wire::dialect::{COMMAND_ACK_DATA, MavMessage};
+use crate::wire::ids::{command, component, mav_state, message};
+use crate::wire::{DatagramFrames, Frame, FrameBuffer, MavId, StreamDecoder, Target};
+use channels::Channels;
+use conflicts::{Conflict, Conflicts};
+use identity::Identity;
+use outbox::Outbox;
+use roster::{GimbalOutput, Roster};
+use sent::SentFrames;
+use settings::{FALLBACK_SYSTEM_ID, Role, Settings};
+use streams::AutopilotStreams;
 
 /// Position of a link in [`settings::Settings::links`].
 pub type LinkIndex = usize;
@@ -56,4 +82,409 @@ pub enum Output<'a> {
     Transmit { channels: ChannelSet, bytes: &'a [u8] },
     /// Keep the adopted system id for the next start.
     StoreSystemId(u8),
+}
+
+/// The core.
+#[derive(Debug)]
+pub struct Bridge {
+    settings: Settings,
+    started: Timestamp,
+    channels: Channels,
+    router: Router,
+    identity: Identity,
+    vehicle: Vehicle,
+    /// The autopilot of our system, once it was heard.
+    autopilot: Option<MavId>,
+    /// Systems in which an autopilot was heard.
+    vehicles: Vec<bool>,
+    roster: Roster,
+    streams: AutopilotStreams,
+    conflicts: Conflicts,
+    sent: SentFrames,
+    outbox: Outbox,
+    buffer: FrameBuffer,
+    timers: TimerTable<Timer>,
+    shutting_down: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Timer {
+    /// When the managers beat next, and what is looked after once a second.
+    Heartbeat,
+}
+
+impl Bridge {
+    pub fn new(now: Timestamp, settings: Settings) -> Self {
+        let identity = Identity::new(now, settings.system_id, settings.stored_system_id);
+        let mut bridge = Self {
+            started: now,
+            channels: Channels::new(settings.links.clone()),
+            router: Router::default(),
+            vehicle: Vehicle::new(),
+            autopilot: None,
+            vehicles: vec![false; 256],
+            roster: Roster::new(&settings),
+            streams: AutopilotStreams::default(),
+            conflicts: Conflicts::default(),
+            sent: SentFrames::default(),
+            outbox: Outbox::default(),
+            buffer: FrameBuffer::default(),
+            timers: TimerTable::default(),
+            shutting_down: false,
+            identity,
+            settings,
+        };
+        bridge.router.set_own_system(bridge.identity.system());
+        bridge.timers.set(Timer::Heartbeat, now);
+        bridge
+    }
+
+    /// Takes one input; drain [`poll_output`](Self::poll_output) afterwards.
+    pub fn handle_input(&mut self, now: Timestamp, input: Input<'_>) {
+        match input {
+            Input::LinkUp { link } => {
+                if let Some(link) = self.channels.link_mut(link) {
+                    link.up = true;
+                    link.reason = None;
+                }
+            }
+            Input::LinkDown { link, reason } => {
+                if let Some(link) = self.channels.link_mut(link) {
+                    link.up = false;
+                    link.reason = Some(reason.to_owned());
+                }
+            }
+            Input::ChannelOpened { channel, link, address } => self.open_channel(now, channel, link, address),
+            Input::ChannelClosed { channel } => self.close_channel(channel),
+            Input::Received { channel, bytes } => self.handle_received(now, channel, bytes),
+            Input::SendFailed { channel, frames, reason } => {
+                for _ in 0..frames {
+                    self.count_dropped_towards(channel, reason);
+                }
+            }
+            Input::Shutdown => self.shut_down(now),
+        }
+        self.carry_out(now);
+    }
+
+    /// Does what is due at `now`; drain [`poll_output`](Self::poll_output) afterwards.
+    pub fn handle_timeout(&mut self, now: Timestamp) {
+        self.settle_identity(now);
+        for channel in self.channels.stalled(now) {
+            self.decode_stream(now, channel, |decoder| decoder.handle_timeout(now));
+        }
+        while let Some(timer) = self.timers.pop_due(now) {
+            match timer {
+                Timer::Heartbeat => self.handle_heartbeat_timer(now),
+            }
+        }
+        self.ask_autopilot(now);
+        for at in 0..self.roster.len() {
+            let around = surroundings(&self.vehicle, self.autopilot);
+            let gimbal = self.roster.get_mut(at);
+            gimbal.driver.handle_timeout(now);
+            if gimbal.manager.poll_timeout().is_some_and(|due| due <= now) && self.identity.system().is_some() {
+                gimbal.manager.handle_timeout(now, around);
+            }
+        }
+        self.carry_out(now);
+        self.channels.pump_all(now, &mut self.outbox);
+    }
+
+    /// The next thing to be done, `None` when the last input is dealt with.
+    pub fn poll_output(&mut self) -> Option<Output<'_>> {
+        self.outbox.pop()
+    }
+
+    /// When [`handle_timeout`](Self::handle_timeout) is due.
+    pub fn poll_timeout(&self) -> Option<Timestamp> {
+        let timers = [
+            self.timers.next().map(|(at, _)| at),
+            self.identity.poll_timeout(),
+            self.channels.poll_timeout(),
+            self.streams.poll_timeout().filter(|_| self.identity.system().is_some()),
+        ];
+        let gimbals = self.roster.iter().filter_map(|gimbal| gimbal.poll_timeout());
+        let gimbals = gimbals.filter(|_| self.identity.system().is_some());
+        timers.into_iter().flatten().chain(gimbals).min()
+    }
+
+    /// Whether everything due before the end has been given out.
+    pub fn is_finished(&self) -> bool {
+        self.shutting_down && self.channels.is_drained()
+    }
+
+    fn open_channel(&mut self, now: Timestamp, channel: ChannelId, link: LinkIndex, address: &str) {
+        if !self.channels.open(channel, link, address) {
+            return;
+        }
+        self.router.close_channel(channel);
+        self.router.open_channel(channel);
+        for gimbal in self.roster.iter_mut() {
+            gimbal.manager.open_channel(now, channel);
+        }
+        // A gimbal takes the system id of the first heartbeat it hears, so ours is the first there.
+        if self.channels.role(channel) == Some(Role::Gimbal) && self.identity.system().is_some() {
+            self.beat(now, channel.into());
+        }
+    }
+
+    fn close_channel(&mut self, channel: ChannelId) {
+        self.channels.close(channel);
+        self.router.close_channel(channel);
+        for gimbal in self.roster.iter_mut() {
+            gimbal.manager.close_channel(channel);
+        }
+    }
+
+    fn handle_received(&mut self, now: Timestamp, channel: ChannelId, bytes: &[u8]) {
+        let Some(state) = self.channels.channel_mut(channel) else { return };
+        state.last_heard = Some(now);
+        let (link, is_stream) = (state.link, state.decoder.is_some());
+        if let Some(link) = self.channels.link_mut(link) {
+            link.rx_bytes += bytes.len() as u64;
+        }
+        if is_stream {
+            self.decode_stream(now, channel, |decoder| decoder.push(now, bytes));
+            return;
+        }
+        let mut frames = DatagramFrames::new(bytes);
+        while let Some(frame) = frames.next_frame() {
+            self.handle_frame(now, channel, &frame);
+        }
+        if let Some(link) = self.channels.link_mut(link) {
+            link.rx_frames += frames.counters().frames;
+            link.wire.add(frames.counters());
+        }
+    }
+
+    fn decode_stream(&mut self, now: Timestamp, channel: ChannelId, feed: impl FnOnce(&mut StreamDecoder)) {
+        // The decoder is taken out while its frames are dealt with, and put back behind them.
+        let Some(state) = self.channels.channel_mut(channel) else { return };
+        let link = state.link;
+        let Some(mut decoder) = state.decoder.take() else { return };
+        feed(&mut decoder);
+        let mut frames = 0;
+        while let Some(frame) = decoder.next_frame() {
+            frames += 1;
+            self.handle_frame(now, channel, &frame);
+        }
+        if let Some(state) = self.channels.channel_mut(channel) {
+            state.decoder = Some(decoder);
+        }
+        if let Some(link) = self.channels.link_mut(link) {
+            link.rx_frames += frames;
+        }
+    }
+
+    /// Takes the system id that the heartbeats of autopilots amount to.
+    fn settle_identity(&mut self, now: Timestamp) {
+        let before = self.identity.system();
+        let held = self.roster.iter().any(|gimbal| gimbal.manager.is_held());
+        if !self.identity.update(now, held) {
+            return;
+        }
+        let system = self.identity.system();
+        tracing::info!(system_id = system, fallback = self.identity.is_bootstrap(), "system id");
+        self.router.set_own_system(system);
+        if let Some(before) = before {
+            self.router.forget_system(before);
+            let around = surroundings(&self.vehicle, self.autopilot);
+            for gimbal in self.roster.iter_mut() {
+                gimbal.manager.forget_system(now, before, around);
+            }
+        }
+        self.autopilot = self.autopilot.filter(|autopilot| Some(autopilot.system) == system);
+        if let Some(system) = system
+            && !self.identity.is_bootstrap()
+        {
+            self.outbox.push_system_id(system);
+        }
+        // Our first frame under a new id is a heartbeat, everywhere.
+        self.timers.set(Timer::Heartbeat, now);
+    }
+
+    fn handle_heartbeat_timer(&mut self, now: Timestamp) {
+        let due = now + heartbeat::INTERVAL;
+        self.timers.set(Timer::Heartbeat, due);
+        if self.identity.system().is_none() {
+            self.beat_on_bootstrap_links(now);
+            return;
+        }
+        self.beat(now, self.channels.open_set());
+        if self.identity.autopilots(now).count() > 1 && self.settings.system_id == settings::SystemId::Auto {
+            self.conflicts.note(now, Conflict::SeveralAutopilots);
+        }
+        self.look_after_streams(now);
+    }
+
+    /// A heartbeat of each manager on `channels`.
+    fn beat(&mut self, now: Timestamp, channels: ChannelSet) {
+        let bootstrap = self.identity.is_bootstrap();
+        for at in 0..self.roster.len() {
+            let gimbal = self.roster.get_mut(at);
+            if gimbal.beats() {
+                let (component, message) = (gimbal.component, heartbeat::heartbeat(gimbal, bootstrap));
+                self.send(now, channels, component, &message);
+            }
+        }
+    }
+
+    /// An autopilot that listens must hear somebody before it speaks; it is told the fallback id.
+    fn beat_on_bootstrap_links(&mut self, now: Timestamp) {
+        let speaks_first =
+            |channel: &ChannelId| self.channels.link_of(*channel).is_some_and(|(_, link)| link.settings.speaks_first);
+        let channels: Vec<ChannelId> = self.channels.with_role(Role::Autopilot).filter(speaks_first).collect();
+        let message = messages::heartbeat(mav_state::BOOT);
+        for channel in channels {
+            self.send_as(now, FALLBACK_SYSTEM_ID, channel.into(), component::ONBOARD_COMPUTER, &message);
+        }
+    }
+
+    /// Which messages of the autopilot are wanted at present.
+    fn look_after_streams(&mut self, now: Timestamp) {
+        if self.autopilot.is_some() && !self.vehicle.alive(now) {
+            self.streams.handle_autopilot_lost();
+        }
+        let has_gimbal_of_ours = self.roster.iter().filter_map(|gimbal| gimbal.manager.device()).any(|device| {
+            let channels = self.router.routes().component_channels(device);
+            !channels.is_empty() && channels.intersection(self.channels.with_role(Role::Autopilot)).is_empty()
+        });
+        self.streams.set_needed(message::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE, has_gimbal_of_ours);
+        self.streams.set_needed(message::GLOBAL_POSITION_INT, true);
+        self.streams.set_needed(message::ATTITUDE, self.vehicle.heading(now).is_none());
+    }
+
+    fn ask_autopilot(&mut self, now: Timestamp) {
+        let (Some(system), Some(autopilot)) = (self.identity.system(), self.autopilot) else { return };
+        let Some((message_id, interval)) = self.streams.take_due(now) else { return };
+        let target = Target::Component(autopilot);
+        let request = packet::set_message_interval(target, message_id, interval);
+        let channels = self.router.route_own(now, target);
+        let component = self.roster.get_mut(0).component;
+        self.send_as(now, system, channels, component, &request);
+    }
+
+    /// The autopilot's answer to what we asked of it.
+    fn note_answer(&mut self, frame: &Frame<'_>) {
+        let Some(ack) = frame.decode::<COMMAND_ACK_DATA>() else { return };
+        let target = frame.target();
+        let to_us = target == Target::Everyone
+            || matches!(target, Target::Component(id) if self.is_own_id(id))
+            || target == Target::System(self.identity.system().unwrap_or(0));
+        if ack.command == command::SET_MESSAGE_INTERVAL && to_us {
+            self.streams.handle_answer(ack.result);
+        }
+    }
+
+    fn shut_down(&mut self, now: Timestamp) {
+        let around = surroundings(&self.vehicle, self.autopilot);
+        for gimbal in self.roster.iter_mut() {
+            gimbal.manager.handle_shutdown(now, around);
+        }
+        self.carry_out(now);
+        if self.identity.system().is_some() {
+            for at in 0..self.roster.len() {
+                let gimbal = self.roster.get_mut(at);
+                if gimbal.beats() {
+                    let component = gimbal.component;
+                    self.send(now, self.channels.open_set(), component, &heartbeat::goodbye());
+                }
+            }
+        }
+        self.timers.cancel(Timer::Heartbeat);
+        self.shutting_down = true;
+    }
+
+    /// Does what the gimbals' drivers and managers want done.
+    fn carry_out(&mut self, now: Timestamp) {
+        if self.identity.system().is_none() {
+            return;
+        }
+        for at in 0..self.roster.len() {
+            while let Some(output) = self.roster.get_mut(at).poll_output() {
+                let component = self.roster.get_mut(at).component;
+                match output {
+                    GimbalOutput::Driver(DriverOutput::Message(message)) => {
+                        let device = self.roster.get_mut(at).manager.device();
+                        let channels = device.map_or(ChannelSet::EMPTY, |device| self.channels_of_device(device));
+                        self.send(now, channels, component, &message);
+                    }
+                    GimbalOutput::Driver(DriverOutput::Report(report)) => {
+                        let around = surroundings(&self.vehicle, self.autopilot);
+                        self.roster.get_mut(at).manager.handle_report(now, report, around);
+                    }
+                    GimbalOutput::Manager(output) => self.carry_out_for_manager(now, at, component, output),
+                }
+            }
+        }
+    }
+
+    fn carry_out_for_manager(&mut self, now: Timestamp, at: usize, component: u8, output: ManagerOutput) {
+        match output {
+            ManagerOutput::Reply { to, message } => {
+                let channels = self.router.route_own(now, Target::new(to.system, to.component));
+                self.send(now, channels, component, &message);
+            }
+            ManagerOutput::Answer { channel, message } => self.send(now, channel.into(), component, &message),
+            ManagerOutput::Broadcast { channels, message } => {
+                let mut channels = channels.unwrap_or(self.channels.open_set());
+                if !matches!(*message, MavMessage::GIMBAL_MANAGER_STATUS(_)) {
+                    // A gimbal has no use for what a manager tells its clients.
+                    channels = channels.without(self.channels.with_role(Role::Gimbal));
+                }
+                self.send(now, channels, component, &message);
+            }
+            ManagerOutput::Heartbeat { channel } => {
+                let message = heartbeat::heartbeat(self.roster.get_mut(at), self.identity.is_bootstrap());
+                self.send(now, channel.into(), component, &message);
+            }
+            ManagerOutput::Steer(setpoint) => self.roster.get_mut(at).driver.handle_setpoint(now, setpoint),
+        }
+    }
+
+    fn channels_of_device(&self, device: MavId) -> ChannelSet {
+        self.router.routes().component_channels(device)
+    }
+
+    /// Sends a message of our own, numbered for each channel.
+    fn send(&mut self, now: Timestamp, channels: ChannelSet, component: u8, message: &MavMessage) {
+        if let Some(system) = self.identity.system() {
+            self.send_as(now, system, channels, component, message);
+        }
+    }
+
+    fn send_as(&mut self, now: Timestamp, system: u8, channels: ChannelSet, component: u8, message: &MavMessage) {
+        let source = MavId::new(system, component);
+        for channel in channels {
+            let Some(state) = self.channels.channel_mut(channel) else { continue };
+            let sequence = state.next_sequence(component);
+            let frame = self.buffer.encode_any(source, sequence, message);
+            if self.channels.limit_rate(now, channel.into(), &frame).is_empty() {
+                continue;
+            }
+            self.sent.note(frame.bytes());
+            self.channels.transmit(now, channel.into(), &frame, &mut self.outbox);
+        }
+    }
+
+    fn is_own_id(&self, id: MavId) -> bool {
+        Some(id.system) == self.identity.system() && self.roster.has_manager(id.component)
+    }
+
+    fn count_dropped(&mut self, link: LinkIndex, reason: &'static str) {
+        if let Some(link) = self.channels.link_mut(link) {
+            link.count_dropped(reason);
+        }
+    }
+
+    fn count_dropped_towards(&mut self, channel: ChannelId, reason: &'static str) {
+        if let Some(link) = self.channels.channel(channel).map(|channel| channel.link) {
+            self.count_dropped(link, reason);
+        }
+    }
+}
+
+fn surroundings(vehicle: &Vehicle, autopilot: Option<MavId>) -> Surroundings<'_> {
+    Surroundings { vehicle, autopilot, overheard: false, other_vehicle: false }
 }

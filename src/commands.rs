@@ -2,4 +2,6 @@
 
 pub mod check;
 pub mod demo;
+pub mod run;
 pub mod sim;
+pub mod status;

@@ -1,4 +1,4 @@
-//! The process around the core: clock, links, logging, state file, service manager, and the window that others see it
+//! The process around the core: clock, links, log, state file, service manager, and the window that others see it
 //! through.
 
 mod channels;

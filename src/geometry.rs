@@ -14,4 +14,4 @@ pub use aim::{Aim, Position};
 pub use angle::{Angle, AngularRate};
 pub use attitude::{AircraftAngles, Attitude, EarthFrame, GimbalAngles, QuaternionError, VehicleFrame};
 pub use limits::{AxisLimits, Limits};
-pub use yaw::Yaw;
+pub use yaw::{Yaw, YawFrame};

@@ -1,4 +1,11 @@
 //! Gimbals behind one driver trait, a folder per family.
 
+pub mod adapt;
+pub mod capabilities;
+pub mod driver;
 pub mod mavlink_v2;
+pub mod report;
+pub mod setpoint;
 pub mod settings;
+
+pub use driver::{DriverOutput, GimbalDriver};

@@ -12,6 +12,7 @@ pub mod endpoint;
 pub mod exit_code;
 pub mod geometry;
 pub mod gimbals;
+pub mod http;
 pub mod links;
 pub mod manager;
 pub mod router;

@@ -1,3 +1,455 @@
 //! The gimbal manager: who may steer, and what the gimbal is told.
+//!
+//! Implements the manager side of the MAVLink Gimbal Protocol v2 for one gimbal. The rules stand in files of their own
+//! ([`control`], [`tracking`], [`intervals`]); this machine puts them in order.
 
+pub mod control;
+pub mod intervals;
+pub mod messages;
+pub mod request;
 pub mod settings;
+pub mod tracking;
+
+mod commands;
+
+use std::collections::{BTreeMap, VecDeque};
+use std::time::Duration;
+
+use crate::channel::{ChannelId, ChannelSet};
+use crate::geometry::{Angle, AngularRate, AxisLimits};
+use crate::gimbals::capabilities::Capabilities;
+use crate::gimbals::report::{GimbalStatus, Identity, Report};
+use crate::gimbals::setpoint::Setpoint;
+use crate::gimbals::settings::GimbalSettings;
+use crate::timestamp::Timestamp;
+use crate::vehicle::Vehicle;
+use crate::wire::MavId;
+use crate::wire::dialect::MavMessage;
+use crate::wire::ids::{CommandResult, FailureFlags, GimbalFlags};
+use control::{Control, PRIMARY_SILENCE, Policy};
+use intervals::{DEFAULT_STATUS_INTERVAL, Schedule};
+use messages::Interval;
+use request::{Demand, DemandKind, Refusal, Request};
+use settings::ControlSettings;
+use tracking::{RateTimeouts, Situation, Tracking};
+
+/// An attitude older than this is not where the gimbal looks now.
+const ATTITUDE_STALE: Duration = Duration::from_secs(1);
+
+/// So many senders are told apart in the counters of refusals.
+const MAX_COUNTED_SENDERS: usize = 64;
+
+/// Where a request came from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sender {
+    pub id: MavId,
+    pub channel: ChannelId,
+}
+
+/// Who else is there while a manager decides.
+#[derive(Clone, Copy, Debug)]
+pub struct Surroundings<'a> {
+    pub vehicle: &'a Vehicle,
+    /// The autopilot of our system, once it was heard.
+    pub autopilot: Option<MavId>,
+    /// Whether a request of another component reached us by listening in: it is never answered.
+    pub overheard: bool,
+    /// Whether the sender belongs to another vehicle, which never has a say.
+    pub other_vehicle: bool,
+}
+
+/// What a manager wants done.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ManagerOutput {
+    /// To be sent to where `to` is known.
+    Reply {
+        to: MavId,
+        message: Box<MavMessage>,
+    },
+    /// To be sent on the channel of the one who asked.
+    Answer {
+        channel: ChannelId,
+        message: Box<MavMessage>,
+    },
+    /// To be sent on these channels, or on all.
+    Broadcast {
+        channels: Option<ChannelSet>,
+        message: Box<MavMessage>,
+    },
+    /// The heartbeat was asked for.
+    Heartbeat {
+        channel: ChannelId,
+    },
+    Steer(Setpoint),
+}
+
+/// How the gimbal is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DeviceState {
+    Searching,
+    Alive,
+    Lost,
+}
+
+impl DeviceState {
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Searching => "searching",
+            Self::Alive => "alive",
+            Self::Lost => "lost",
+        }
+    }
+}
+
+/// The manager of one gimbal.
+#[derive(Debug)]
+pub struct GimbalManager {
+    settings: GimbalSettings,
+    rules: ControlSettings,
+    device: Option<MavId>,
+    state: DeviceState,
+    identity: Identity,
+    capabilities: Option<Capabilities>,
+    status: Option<(Timestamp, GimbalStatus)>,
+    control: Control,
+    tracking: Tracking,
+    status_schedule: Schedule,
+    information_schedule: Schedule,
+    /// When the primary last made a demand.
+    primary_demand: Option<Timestamp>,
+    /// The flags that the last 281 carried.
+    told_flags: GimbalFlags,
+    rejected: BTreeMap<MavId, BTreeMap<&'static str, u64>>,
+    outputs: VecDeque<ManagerOutput>,
+}
+
+impl GimbalManager {
+    pub fn new(settings: GimbalSettings, rules: ControlSettings) -> Self {
+        Self {
+            tracking: Tracking::new(settings.setpoint_rate_hz),
+            settings,
+            rules,
+            device: None,
+            state: DeviceState::Searching,
+            identity: Identity::default(),
+            capabilities: None,
+            status: None,
+            control: Control::default(),
+            status_schedule: Schedule::new(Interval::Every(DEFAULT_STATUS_INTERVAL)),
+            information_schedule: Schedule::new(Interval::Off),
+            primary_demand: None,
+            told_flags: GimbalFlags::empty(),
+            rejected: BTreeMap::new(),
+            outputs: VecDeque::new(),
+        }
+    }
+
+    pub fn open_channel(&mut self, now: Timestamp, channel: ChannelId) {
+        self.status_schedule.open(now, channel);
+        self.information_schedule.open(now, channel);
+    }
+
+    pub fn close_channel(&mut self, channel: ChannelId) {
+        self.status_schedule.close(channel);
+        self.information_schedule.close(channel);
+    }
+
+    /// A request addressed to this manager, or to everybody.
+    pub fn handle_request(&mut self, now: Timestamp, sender: Sender, request: &Request, around: Surroundings<'_>) {
+        match request {
+            Request::Demand { gimbal, demand } => {
+                if *gimbal != 0 && Some(*gimbal) != self.device_id() {
+                    return;
+                }
+                if let Err(refusal) = self.handle_demand(now, sender.id, demand, around) {
+                    self.count_refusal(sender.id, refusal.reason);
+                }
+            }
+            Request::Command(command) => self.handle_command(now, sender, command, around),
+        }
+        self.carry_out(now, around);
+    }
+
+    /// A message meant for this manager was malformed.
+    pub fn count_refusal(&mut self, sender: MavId, reason: &'static str) {
+        tracing::debug!(gimbal = self.settings.name, %sender, reason, "refused");
+        if self.rejected.len() >= MAX_COUNTED_SENDERS && !self.rejected.contains_key(&sender) {
+            return;
+        }
+        *self.rejected.entry(sender).or_default().entry(reason).or_default() += 1;
+    }
+
+    /// News from the driver.
+    pub fn handle_report(&mut self, now: Timestamp, report: Report, around: Surroundings<'_>) {
+        match report {
+            Report::Alive { device } => {
+                self.device = Some(device);
+                self.state = DeviceState::Alive;
+                tracing::info!(gimbal = self.settings.name, %device, "gimbal found");
+            }
+            Report::Known(identity, capabilities) => {
+                let changed = self.identity != identity || self.capabilities != Some(capabilities);
+                self.identity = identity;
+                self.capabilities = Some(capabilities);
+                if changed {
+                    let (vendor, model) = (&self.identity.vendor, &self.identity.model);
+                    tracing::info!(gimbal = self.settings.name, vendor, model, "gimbal known");
+                    if let Some(message) = self.information(now) {
+                        self.outputs.push_back(ManagerOutput::Broadcast { channels: None, message });
+                    }
+                }
+            }
+            Report::Attitude(status) => self.status = Some((now, status)),
+            Report::Lost => {
+                self.state = DeviceState::Lost;
+                self.status = None;
+                self.tracking.forget();
+                tracing::warn!(gimbal = self.settings.name, "gimbal lost");
+            }
+        }
+        self.carry_out(now, around);
+    }
+
+    /// Something was heard from `id`, which keeps its control alive.
+    pub fn handle_heard(&mut self, now: Timestamp, id: MavId) {
+        self.control.handle_heard(now, id);
+    }
+
+    pub fn handle_timeout(&mut self, now: Timestamp, around: Surroundings<'_>) {
+        let primary = self.control.primary();
+        if self.control.handle_timeout(now, self.rules.lease_timeout) {
+            tracing::info!(gimbal = self.settings.name, "control lapsed: its holder is silent");
+            self.after_change_of_control(now, primary);
+        }
+        let due = self.status_schedule.take_due(now);
+        if !due.is_empty()
+            && let Some(message) = self.status_message(now)
+        {
+            self.outputs.push_back(ManagerOutput::Broadcast { channels: Some(due), message });
+        }
+        let due = self.information_schedule.take_due(now);
+        if !due.is_empty()
+            && let Some(message) = self.information(now)
+        {
+            self.outputs.push_back(ManagerOutput::Broadcast { channels: Some(due), message });
+        }
+        self.tracking.handle_timeout(now);
+        self.carry_out(now, around);
+    }
+
+    pub fn poll_timeout(&self) -> Option<Timestamp> {
+        let schedules = [self.status_schedule.poll_timeout(), self.information_schedule.poll_timeout()];
+        // Without a device there is nothing to tell of.
+        let schedules = schedules.into_iter().flatten().filter(|_| self.device.is_some());
+        let rest = [self.tracking.poll_timeout(), self.control.poll_timeout(self.rules.lease_timeout)];
+        schedules.chain(rest.into_iter().flatten()).min()
+    }
+
+    pub fn poll_output(&mut self) -> Option<ManagerOutput> {
+        self.outputs.pop_front()
+    }
+
+    /// Stops every rotation at once: the process is to end.
+    pub fn handle_shutdown(&mut self, now: Timestamp, around: Surroundings<'_>) {
+        self.tracking.stop_rates(now);
+        self.carry_out(now, around);
+    }
+
+    /// The autopilot's system id has changed: places held under the old one are void.
+    pub fn forget_system(&mut self, now: Timestamp, system: u8, around: Surroundings<'_>) {
+        let primary = self.control.primary();
+        if self.control.forget_system(system) {
+            self.after_change_of_control(now, primary);
+        }
+        self.carry_out(now, around);
+    }
+
+    pub fn settings(&self) -> &GimbalSettings {
+        &self.settings
+    }
+
+    pub fn device(&self) -> Option<MavId> {
+        self.device
+    }
+
+    /// The gimbal device id of 280 and 281: a v2 device's component id.
+    pub fn device_id(&self) -> Option<u8> {
+        self.device.map(|device| device.component)
+    }
+
+    pub fn state(&self) -> DeviceState {
+        self.state
+    }
+
+    pub fn identity(&self) -> &Identity {
+        &self.identity
+    }
+
+    /// The latest attitude and when it came, however old.
+    pub fn status(&self) -> Option<(Timestamp, &GimbalStatus)> {
+        self.status.as_ref().map(|(at, status)| (*at, status))
+    }
+
+    pub fn control(&self) -> &Control {
+        &self.control
+    }
+
+    pub fn tracking(&self) -> &Tracking {
+        &self.tracking
+    }
+
+    /// What was refused, by sender and reason.
+    pub fn rejected(&self) -> &BTreeMap<MavId, BTreeMap<&'static str, u64>> {
+        &self.rejected
+    }
+
+    /// Whether somebody holds primary or secondary control.
+    pub fn is_held(&self) -> bool {
+        self.control.primary().is_some() || self.control.secondary().is_some()
+    }
+
+    /// Whether the device reports a fault that is more than a limit reached.
+    pub fn has_hard_failure(&self) -> bool {
+        self.status.is_some_and(|(_, status)| status.failures.intersects(FailureFlags::HARD))
+    }
+
+    /// The flags for 281: those of the setpoint, with the device's own state bits; the device's while there is none.
+    pub fn flags(&self) -> GimbalFlags {
+        let of_device = GimbalFlags::ACCEPTS_YAW_IN_EARTH_FRAME | GimbalFlags::RC_EXCLUSIVE | GimbalFlags::RC_MIXED;
+        let reported = self.status.map_or(GimbalFlags::empty(), |(_, status)| status.flags);
+        match self.tracking.last() {
+            Some(setpoint) => setpoint.flags() | reported.intersection(of_device),
+            None => reported.intersection(GimbalFlags::from_bits_retain(0x3ff)),
+        }
+    }
+
+    fn policy(&self, around: Surroundings<'_>) -> Policy {
+        Policy {
+            open_when_unclaimed: self.rules.open_when_unclaimed,
+            takeover: self.settings.takeover,
+            release_quirk_of: around.autopilot.filter(|_| self.rules.px4_release_quirk),
+        }
+    }
+
+    fn gate(&self, now: Timestamp, sender: MavId, around: Surroundings<'_>) -> Result<(), Refusal> {
+        if around.other_vehicle {
+            return Err(Refusal::denied("other_vehicle"));
+        }
+        let silent = self.primary_demand.is_none_or(|at| now.since(at) > PRIMARY_SILENCE);
+        self.control.gate(sender, silent, self.policy(around))
+    }
+
+    /// Whether there is a gimbal that can be steered now.
+    fn steerable(&self) -> Result<&Capabilities, Refusal> {
+        match (self.state, &self.capabilities) {
+            (DeviceState::Lost, _) => Err(Refusal { result: CommandResult::Failed, reason: "gimbal_lost" }),
+            (DeviceState::Alive, Some(capabilities)) => {
+                let calibrating =
+                    self.status.is_some_and(|(_, status)| status.failures.contains(FailureFlags::CALIBRATION_RUNNING));
+                if calibrating { Err(Refusal::later("gimbal_calibrating")) } else { Ok(capabilities) }
+            }
+            _ => Err(Refusal::later("no_gimbal_yet")),
+        }
+    }
+
+    fn handle_demand(
+        &mut self,
+        now: Timestamp,
+        sender: MavId,
+        demand: &Demand,
+        around: Surroundings<'_>,
+    ) -> Result<(), Refusal> {
+        self.gate(now, sender, around)?;
+        let capabilities = *self.steerable()?;
+        let demand = match demand.kind {
+            DemandKind::Manual => self.scale_manual(demand, &capabilities),
+            DemandKind::Streamed | DemandKind::Commanded => *demand,
+        };
+        let situation = self.situation(now, &capabilities, around);
+        let timeouts = self.timeouts();
+        self.tracking.demand(now, sender, &demand, &situation, timeouts)?;
+        if self.control.primary() == Some(sender) {
+            self.primary_demand = Some(now);
+        }
+        Ok(())
+    }
+
+    /// Manual control (288) from −1…1 to what the gimbal can do: the ends of its reach, or the configured rates.
+    fn scale_manual(&self, demand: &Demand, capabilities: &Capabilities) -> Demand {
+        let reach = |fraction: Angle, limits: Option<AxisLimits>, substitute: f64| {
+            let (min, max) =
+                limits.map_or((-substitute, substitute), |limits| (limits.min().degrees(), limits.max().degrees()));
+            let fraction = fraction.radians();
+            Angle::from_degrees(if fraction < 0.0 { -fraction * min } else { fraction * max })
+        };
+        let mut scaled = *demand;
+        let limits = &capabilities.limits;
+        scaled.pitch.angle = demand.pitch.angle.map(|fraction| reach(fraction, limits.pitch, 90.0));
+        scaled.yaw.angle = demand.yaw.angle.map(|fraction| reach(fraction, limits.yaw, 180.0));
+        let rate = |fraction: AngularRate, full_dps: f64| {
+            AngularRate::from_degrees_per_second(fraction.radians_per_second() * full_dps)
+        };
+        scaled.pitch.rate = demand.pitch.rate.map(|fraction| rate(fraction, self.settings.manual_pitch_rate_dps));
+        scaled.yaw.rate = demand.yaw.rate.map(|fraction| rate(fraction, self.settings.manual_yaw_rate_dps));
+        scaled
+    }
+
+    fn timeouts(&self) -> RateTimeouts {
+        let commanded = Some(self.rules.command_rate_timeout).filter(|timeout| !timeout.is_zero());
+        RateTimeouts { streamed: self.rules.rate_timeout, commanded }
+    }
+
+    fn situation<'a>(&self, now: Timestamp, capabilities: &'a Capabilities, around: Surroundings<'_>) -> Situation<'a> {
+        let status = self.status.filter(|(at, _)| now.since(*at) <= ATTITUDE_STALE).map(|(_, status)| status);
+        Situation {
+            measured: status,
+            heading: status.and_then(|status| status.heading).or(around.vehicle.heading(now)),
+            position: around.vehicle.position(now),
+            capabilities,
+            accepts_earth_yaw: self.status.is_some_and(|(_, status)| status.accepts_earth_yaw),
+            device_yaw_frame: self.settings.device_yaw_frame,
+        }
+    }
+
+    /// After each event: a setpoint that is due goes out, and a change of the flags is told.
+    fn carry_out(&mut self, now: Timestamp, around: Surroundings<'_>) {
+        if let Some(capabilities) = self.capabilities {
+            let situation = self.situation(now, &capabilities, around);
+            if let Some(setpoint) = self.tracking.steer(now, &situation) {
+                self.outputs.push_back(ManagerOutput::Steer(setpoint));
+            }
+        }
+        let flags = self.flags();
+        if flags != self.told_flags {
+            self.broadcast_status(now);
+        }
+    }
+
+    /// A 281 to everybody, besides the regular ones.
+    fn broadcast_status(&mut self, now: Timestamp) {
+        self.told_flags = self.flags();
+        if let Some(message) = self.status_message(now) {
+            self.outputs.push_back(ManagerOutput::Broadcast { channels: None, message });
+        }
+    }
+
+    fn after_change_of_control(&mut self, now: Timestamp, primary_before: Option<MavId>) {
+        if self.control.primary() != primary_before {
+            self.tracking.stop_rates(now);
+            self.primary_demand = None;
+        }
+        self.broadcast_status(now);
+    }
+
+    /// 280, once the gimbal is known.
+    fn information(&self, now: Timestamp) -> Option<Box<MavMessage>> {
+        let (device_id, capabilities) = (self.device_id()?, self.capabilities.as_ref()?);
+        Some(Box::new(messages::information(now, device_id, capabilities, true)))
+    }
+
+    /// 281, once there is a gimbal.
+    fn status_message(&self, now: Timestamp) -> Option<Box<MavMessage>> {
+        let (primary, secondary) = (self.control.primary(), self.control.secondary());
+        Some(Box::new(messages::status(now, self.device_id()?, self.flags(), primary, secondary)))
+    }
+}

@@ -15,7 +15,6 @@ use crate::bridge::settings::{Role, Settings};
 use crate::cli::{DemoArgs, SimulatedFamily};
 use crate::config::settings::{DaemonSettings, HttpSettings, link_on};
 use crate::daemon::supervisor;
-use crate::daemon::window::CoreHandle;
 use crate::endpoint::Endpoint;
 use crate::exit_code::ExitCode;
 use crate::gimbals::mavlink_v2::sim::{Device, DeviceSettings};
@@ -45,13 +44,8 @@ enum DemoError {
 }
 
 /// Runs until SIGTERM or SIGINT, or until the duration that was asked for is over.
-pub fn demo(
-    arguments: &DemoArgs,
-    serve_http: impl FnOnce(HttpSettings, CoreHandle) + Send + 'static,
-    output: &mut impl Write,
-    errors: &mut impl Write,
-) -> ExitCode {
-    match run(arguments, serve_http, output) {
+pub fn demo(arguments: &DemoArgs, output: &mut impl Write, errors: &mut impl Write) -> ExitCode {
+    match run(arguments, output) {
         Ok(()) => ExitCode::Ok,
         Err(error) => {
             let cause = std::error::Error::source(&error).map(|cause| format!(": {cause}")).unwrap_or_default();
@@ -62,11 +56,7 @@ pub fn demo(
     }
 }
 
-fn run(
-    arguments: &DemoArgs,
-    serve_http: impl FnOnce(HttpSettings, CoreHandle) + Send + 'static,
-    output: &mut impl Write,
-) -> Result<(), DemoError> {
+fn run(arguments: &DemoArgs, output: &mut impl Write) -> Result<(), DemoError> {
     let cable = Pty::open().map_err(DemoError::Pty)?;
     let path = cable.path().map_err(DemoError::Pty)?.to_string_lossy().into_owned();
     let autopilot = free_port().map_err(DemoError::Port)?;
@@ -87,7 +77,7 @@ fn run(
     // The demo goes on when nobody reads what it says.
     let _ = write!(output, "{}", instructions(arguments, &settings)).and_then(|()| output.flush());
 
-    let result = supervisor::run(settings, serve_http);
+    let result = supervisor::run(settings);
     vehicle.end();
     gimbal.end();
     Ok(result?)

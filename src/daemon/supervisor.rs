@@ -3,7 +3,6 @@
 use std::future::poll_fn;
 use std::io;
 use std::sync::Arc;
-use std::thread;
 use std::time::Duration;
 
 use tokio::sync::{mpsc, watch};
@@ -15,8 +14,8 @@ use super::system_id_file::SystemIdFile;
 use super::systemd::ServiceManager;
 use super::window::CoreHandle;
 use crate::bridge::Bridge;
-use crate::config::settings::{DaemonSettings, HttpSettings};
-use crate::links;
+use crate::config::settings::DaemonSettings;
+use crate::{http, links};
 
 /// Requests that may wait; whoever asks for more waits.
 const REQUESTS: usize = 16;
@@ -38,25 +37,19 @@ pub enum RunError {
 
 /// Runs until SIGTERM or SIGINT.
 ///
-/// `serve_http` runs on a thread of its own, so that no page ever holds up a frame; what becomes of it does not
-/// concern the core.
-pub fn run(
-    settings: DaemonSettings,
-    serve_http: impl FnOnce(HttpSettings, CoreHandle) + Send + 'static,
-) -> Result<(), RunError> {
+/// The window runs on a thread of its own, so that no page ever holds up a frame; what becomes of it does not concern
+/// the core.
+pub fn run(settings: DaemonSettings) -> Result<(), RunError> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_io().build().map_err(RunError::Runtime)?;
     let result = runtime.block_on(async {
-        let mut event_loop = assemble(settings, serve_http)?;
+        let mut event_loop = assemble(settings)?;
         poll_fn(|cx| event_loop.poll(cx)).await.map_err(RunError::Timer)
     });
     runtime.shutdown_timeout(FILE_PATIENCE);
     result
 }
 
-fn assemble(
-    settings: DaemonSettings,
-    serve_http: impl FnOnce(HttpSettings, CoreHandle) + Send + 'static,
-) -> Result<EventLoop, RunError> {
+fn assemble(settings: DaemonSettings) -> Result<EventLoop, RunError> {
     // Signals first: whoever ends us while we start gets a goodbye too.
     let shutdown = Shutdown::new().map_err(RunError::Signals)?;
     let timer = DeadlineTimer::new().map_err(RunError::Timer)?;
@@ -72,10 +65,7 @@ fn assemble(
     let (published, snapshots) = watch::channel(Arc::new(core.snapshot(clock.now())));
     if let Some(http) = settings.http {
         let handle = CoreHandle { requests, snapshots };
-        thread::Builder::new()
-            .name("http".to_owned())
-            .spawn(move || serve_http(http, handle))
-            .map_err(RunError::HttpThread)?;
+        http::spawn(http, handle).map_err(RunError::HttpThread)?;
     }
 
     let links = settings.endpoints.iter().map(links::link).collect();

@@ -11,7 +11,49 @@ pub enum Yaw {
     InEarthFrame(Angle),
 }
 
+/// What a yaw angle or rate is measured from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum YawFrame {
+    /// The vehicle's heading.
+    Vehicle,
+    /// North.
+    Earth,
+}
+
 impl Yaw {
+    pub const fn new(frame: YawFrame, angle: Angle) -> Self {
+        match frame {
+            YawFrame::Vehicle => Self::InVehicleFrame(angle),
+            YawFrame::Earth => Self::InEarthFrame(angle),
+        }
+    }
+
+    pub const fn frame(self) -> YawFrame {
+        match self {
+            Self::InVehicleFrame(_) => YawFrame::Vehicle,
+            Self::InEarthFrame(_) => YawFrame::Earth,
+        }
+    }
+
+    /// The number, in its own frame.
+    pub const fn angle(self) -> Angle {
+        match self {
+            Self::InVehicleFrame(angle) | Self::InEarthFrame(angle) => angle,
+        }
+    }
+
+    /// The same direction in another frame; `None` when that takes a heading and there is none.
+    pub fn in_frame(self, frame: YawFrame, heading: Option<Angle>) -> Option<Self> {
+        if self.frame() == frame {
+            return Some(self);
+        }
+        let heading = heading?;
+        Some(match frame {
+            YawFrame::Vehicle => Self::InVehicleFrame(self.in_vehicle_frame(heading)),
+            YawFrame::Earth => Self::InEarthFrame(self.in_earth_frame(heading)),
+        })
+    }
+
     /// From North, within (−180°, 180°], when the vehicle has this heading.
     pub fn in_earth_frame(self, heading: Angle) -> Angle {
         match self {

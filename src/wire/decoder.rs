@@ -3,19 +3,24 @@
 //! A frame of a known message must pass its checksum; when it does not, scanning goes on one byte further, so a
 //! damaged length never takes a neighbour with it. A frame of an unknown message cannot be checked and passes only
 //! *in sync*: where the frame before it ended, or at the start of a datagram. Even there it must have been closed
-//! with some `CRC_EXTRA`, and gives way to a checked frame inside it.
+//! with some `CRC_EXTRA`, must not be a known message with one wrong bit in its id, and gives way to a checked frame
+//! that begins inside it; so does a signature, which no checksum covers. What is taken depends on the bytes alone,
+//! never on the reads that brought them.
 
+use std::ops::Range;
 use std::time::Duration;
 
 use super::crc::Crc;
-use super::frame::{Frame, Header, INCOMPAT_SIGNED, MAGIC_V1, MAGIC_V2, MAX_FRAME_LEN};
+use super::frame::{CRC_LEN, Frame, Header, INCOMPAT_SIGNED, MAGIC_V1, MAGIC_V2, MAX_FRAME_LEN, Version};
+use super::target::message_shape;
 use crate::timestamp::Timestamp;
 
 /// What a decoder has met so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WireCounters {
     pub frames: u64,
-    /// Frames of known messages, at a place where a frame was due, whose checksum was wrong.
+    /// Frames of known messages, at a place where a frame was due, whose checksum was wrong, or whose length was one
+    /// that MAVLink 1 does not allow.
     pub crc_errors: u64,
     /// Frames, at a place where a frame was due, with an `incompat_flags` bit that we do not know.
     pub incompatible_frames: u64,
@@ -46,7 +51,7 @@ impl<'a> DatagramFrames<'a> {
 
     /// The next frame, `None` at the end.
     pub fn next_frame(&mut self) -> Option<Frame<'a>> {
-        self.scanner.next_frame(&mut self.bytes, true)
+        self.scanner.next_frame(&mut self.bytes, Ahead::Nothing)
     }
 
     pub fn counters(&self) -> WireCounters {
@@ -91,6 +96,7 @@ impl StreamDecoder {
         Self { patience, ..Self::default() }
     }
 
+    /// Appends what was read. Take all frames before the next push: what is kept then is less than two frames long.
     pub fn push(&mut self, now: Timestamp, bytes: &[u8]) {
         if self.start > 0 {
             self.buffer.drain(..self.start);
@@ -104,13 +110,23 @@ impl StreamDecoder {
     pub fn next_frame(&mut self) -> Option<Frame<'_>> {
         let before = &self.buffer[self.start..];
         let mut rest = before;
-        let given_up = std::mem::take(&mut self.given_up);
-        if given_up && !rest.is_empty() {
-            self.scanner.skip(&mut rest);
+        let mut frame = None;
+        if std::mem::take(&mut self.given_up) && !rest.is_empty() {
+            frame = match self.scanner.step(&mut rest, Ahead::Nothing) {
+                Step::Frame(frame) => Some(frame),
+                Step::Skipped | Step::NeedsMore => None,
+            };
         }
-        let frame = self.scanner.next_frame(&mut rest, false);
+        if frame.is_none() {
+            frame = self.scanner.next_frame(&mut rest, Ahead::More);
+        }
         self.start += before.len() - rest.len();
         frame
+    }
+
+    /// How many bytes the decoder has room for: the largest read and less than two frames.
+    pub fn buffer_capacity(&self) -> usize {
+        self.buffer.capacity()
     }
 
     /// When to give up the frame that has begun and not ended.
@@ -163,6 +179,13 @@ impl Default for Scanner {
     }
 }
 
+/// What may follow the bytes at hand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Ahead {
+    More,
+    Nothing,
+}
+
 /// What the bytes at one position are.
 enum Found {
     Frame(Header),
@@ -170,77 +193,162 @@ enum Found {
     NeedsMore,
 }
 
+/// What one look at the front of the bytes led to.
+enum Step<'a> {
+    Frame(Frame<'a>),
+    Skipped,
+    NeedsMore,
+}
+
 impl Scanner {
     /// Takes the next frame off the front of `bytes`, which shrink by it and by what came before it.
-    ///
-    /// With `at_end` nothing will follow `bytes`; otherwise an unfinished frame is left in place.
-    fn next_frame<'a>(&mut self, bytes: &mut &'a [u8], at_end: bool) -> Option<Frame<'a>> {
+    fn next_frame<'a>(&mut self, bytes: &mut &'a [u8], ahead: Ahead) -> Option<Frame<'a>> {
         while !bytes.is_empty() {
-            match self.examine(bytes, at_end) {
-                Found::Frame(header) => {
-                    let (frame, rest) = bytes.split_at(header.frame_len());
-                    *bytes = rest;
-                    self.in_sync = true;
-                    self.counters.frames += 1;
-                    return Some(Frame::new(frame, header));
-                }
-                Found::NoFrame => self.skip(bytes),
-                Found::NeedsMore => return None,
+            match self.step(bytes, ahead) {
+                Step::Frame(frame) => return Some(frame),
+                Step::Skipped => {}
+                Step::NeedsMore => return None,
             }
         }
         None
     }
 
-    fn skip(&mut self, bytes: &mut &[u8]) {
-        self.in_sync = false;
-        self.counters.resync_bytes += 1;
-        *bytes = &bytes[1..];
+    /// Takes one frame, or what can begin none, off the front of `bytes`, which must not be empty.
+    fn step<'a>(&mut self, bytes: &mut &'a [u8], ahead: Ahead) -> Step<'a> {
+        match self.examine(bytes, ahead) {
+            Found::Frame(header) => {
+                let (frame, rest) = bytes.split_at(header.frame_len());
+                *bytes = rest;
+                self.in_sync = true;
+                self.counters.frames += 1;
+                Step::Frame(Frame::new(frame, header))
+            }
+            Found::NoFrame => {
+                let len = 1 + bytes[1..].iter().take_while(|byte| !begins_frame(**byte)).count();
+                *bytes = &bytes[len..];
+                self.in_sync = false;
+                self.counters.resync_bytes += len as u64;
+                Step::Skipped
+            }
+            Found::NeedsMore => Step::NeedsMore,
+        }
     }
 
-    fn examine(&mut self, bytes: &[u8], at_end: bool) -> Found {
-        let unfinished = if at_end { Found::NoFrame } else { Found::NeedsMore };
-        if bytes[0] != MAGIC_V1 && bytes[0] != MAGIC_V2 {
+    fn examine(&mut self, bytes: &[u8], ahead: Ahead) -> Found {
+        let unfinished = match ahead {
+            Ahead::More => Found::NeedsMore,
+            Ahead::Nothing => Found::NoFrame,
+        };
+        if !begins_frame(bytes[0]) {
             return Found::NoFrame;
         }
-        if bytes[0] == MAGIC_V2 && bytes.get(2).is_some_and(|flags| flags & !INCOMPAT_SIGNED != 0) {
+        if has_unknown_incompat_flag(bytes) {
             self.counters.incompatible_frames += u64::from(self.in_sync);
             return Found::NoFrame;
         }
         let Some(header) = Header::read(bytes) else { return unfinished };
-        if header.shape.is_none() && (!self.in_sync || header.source.system == 0) {
-            return Found::NoFrame;
+        if header.shape.is_none() {
+            if !self.in_sync || header.source.system == 0 {
+                return Found::NoFrame;
+            }
+            if bytes.len() < header.frame_len() {
+                return unfinished;
+            }
+            return examine_unknown(bytes, header, ahead);
         }
-        if bytes.len() < header.frame_len() {
-            return unfinished;
-        }
-        let crc = Crc::new().add(&bytes[1..header.payload_end()]);
-        let sum = u16::from_le_bytes([bytes[header.payload_end()], bytes[header.payload_end() + 1]]);
-        match header.shape {
-            Some(shape) if crc.finish(shape.crc_extra) == sum => Found::Frame(header),
-            Some(_) => {
+        match checks_out(bytes, &header) {
+            Some(true) => examine_signature(bytes, header, ahead),
+            Some(false) => {
                 self.counters.crc_errors += u64::from(self.in_sync);
                 Found::NoFrame
             }
-            None if crc.can_finish_as(sum) && !holds_checked_frame(&bytes[1..], header.frame_len() - 1) => {
-                Found::Frame(header)
-            }
-            None => Found::NoFrame,
+            None => unfinished,
         }
     }
 }
 
-/// Whether a frame of a known message starts within the first `len` of `bytes`.
-fn holds_checked_frame(bytes: &[u8], len: usize) -> bool {
-    (0..len.min(bytes.len())).any(|at| {
-        let bytes = &bytes[at..];
-        let Some(header) = Header::read(bytes) else { return false };
-        let Some(shape) = header.shape else { return false };
-        if header.incompat_flags & !INCOMPAT_SIGNED != 0 || bytes.len() < header.frame_len() {
-            return false;
+fn begins_frame(byte: u8) -> bool {
+    byte == MAGIC_V1 || byte == MAGIC_V2
+}
+
+/// Such a frame must be discarded: not even its length is certain.
+fn has_unknown_incompat_flag(bytes: &[u8]) -> bool {
+    bytes[0] == MAGIC_V2 && bytes.get(2).is_some_and(|flags| flags & !INCOMPAT_SIGNED != 0)
+}
+
+/// Whether `bytes` start with a whole and undamaged frame of the known message of `header`; `None` while that is open.
+fn checks_out(bytes: &[u8], header: &Header) -> Option<bool> {
+    let shape = header.shape?;
+    // MAVLink 1 neither cuts zeros off nor adds to a message, so most false starts need not be waited for.
+    if header.version == Version::V1 && !(shape.base_len..=shape.max_len).contains(&header.payload_len) {
+        return Some(false);
+    }
+    if bytes.len() < header.frame_len() {
+        return None;
+    }
+    Some(Crc::new().add(&bytes[1..header.payload_end()]).finish(shape.crc_extra) == sum_of(bytes, header))
+}
+
+fn sum_of(bytes: &[u8], header: &Header) -> u16 {
+    let end = header.payload_end();
+    u16::from_le_bytes([bytes[end], bytes[end + 1]])
+}
+
+/// Whether the frame of an unknown message that `bytes` start with, in sync and whole, is to be believed.
+fn examine_unknown(bytes: &[u8], header: Header, ahead: Ahead) -> Found {
+    let crc = Crc::new().add(&bytes[1..header.payload_end()]);
+    if !crc.can_finish_as(sum_of(bytes, &header)) || is_known_but_for_one_bit(bytes, &header) {
+        return Found::NoFrame;
+    }
+    unless_frame_begins_in(1..header.frame_len(), bytes, header, ahead)
+}
+
+/// Whether the checked frame that `bytes` start with is whole.
+///
+/// The checksum leaves a signature out, so a frame that broke off inside it would take the start of the next for it.
+fn examine_signature(bytes: &[u8], header: Header, ahead: Ahead) -> Found {
+    unless_frame_begins_in(header.payload_end() + CRC_LEN..header.frame_len(), bytes, header, ahead)
+}
+
+/// The frame of `header`, unless a checked frame of a known message begins at one of `positions`.
+fn unless_frame_begins_in(positions: Range<usize>, bytes: &[u8], header: Header, ahead: Ahead) -> Found {
+    let mut open = false;
+    for at in positions {
+        match holds_known_frame(&bytes[at..]) {
+            Some(true) => return Found::NoFrame,
+            Some(false) => {}
+            None => open = true,
         }
-        let end = header.payload_end();
-        let sum = u16::from_le_bytes([bytes[end], bytes[end + 1]]);
-        Crc::new().add(&bytes[1..end]).finish(shape.crc_extra) == sum
+    }
+    match ahead {
+        Ahead::More if open => Found::NeedsMore,
+        Ahead::More | Ahead::Nothing => Found::Frame(header),
+    }
+}
+
+/// Whether a checked frame of a known message starts here; `None` while that is open.
+fn holds_known_frame(bytes: &[u8]) -> Option<bool> {
+    if !begins_frame(bytes[0]) || has_unknown_incompat_flag(bytes) {
+        return Some(false);
+    }
+    let header = Header::read(bytes)?;
+    if header.shape.is_none() { Some(false) } else { checks_out(bytes, &header) }
+}
+
+/// Whether one wrong bit in the id made a known message unknown.
+fn is_known_but_for_one_bit(bytes: &[u8], header: &Header) -> bool {
+    let id_at = match header.version {
+        Version::V1 => 5,
+        Version::V2 => 7,
+    };
+    let sum = sum_of(bytes, header);
+    (0..8 * (header.payload_start() - id_at)).any(|bit| {
+        message_shape(header.message_id ^ (1 << bit)).is_some_and(|shape| {
+            let at = id_at + bit / 8;
+            let mended = bytes[at] ^ (1 << (bit % 8));
+            let crc = Crc::new().add(&bytes[1..at]).add(&[mended]).add(&bytes[at + 1..header.payload_end()]);
+            crc.finish(shape.crc_extra) == sum
+        })
     })
 }
 

@@ -1,8 +1,9 @@
 //! From a message of our own to bytes.
 
-use mavlink_core::{MavlinkVersion, MessageData};
+use mavlink_core::{MavlinkVersion, Message, MessageData};
 
 use super::crc::Crc;
+use super::dialect::MavMessage;
 use super::frame::{Frame, Header, MAGIC_V2, MAX_FRAME_LEN};
 use super::ids::MavId;
 
@@ -20,22 +21,23 @@ impl FrameBuffer {
     /// Encodes `message` as an unsigned MAVLink 2 frame; trailing zero bytes of the payload are cut off.
     pub fn encode<M: MessageData>(&mut self, source: MavId, sequence: u8, message: &M) -> Frame<'_> {
         let payload_len = message.ser(MavlinkVersion::V2, &mut self.0[10..265]);
-        let id = M::ID.to_le_bytes();
+        self.complete(source, sequence, M::ID, M::EXTRA_CRC, payload_len)
+    }
+
+    /// The same for a message of any type.
+    pub fn encode_any(&mut self, source: MavId, sequence: u8, message: &MavMessage) -> Frame<'_> {
+        let payload_len = message.ser(MavlinkVersion::V2, &mut self.0[10..265]);
+        let id = message.message_id();
+        self.complete(source, sequence, id, MavMessage::extra_crc(id), payload_len)
+    }
+
+    fn complete(&mut self, source: MavId, sequence: u8, id: u32, crc_extra: u8, payload_len: usize) -> Frame<'_> {
         let len = u8::try_from(payload_len).expect("a payload has at most 255 bytes");
-        self.0[..10].copy_from_slice(&[
-            MAGIC_V2,
-            len,
-            0,
-            0,
-            sequence,
-            source.system,
-            source.component,
-            id[0],
-            id[1],
-            id[2],
-        ]);
+        let [id_low, id_middle, id_high, _] = id.to_le_bytes();
+        let header = [MAGIC_V2, len, 0, 0, sequence, source.system, source.component, id_low, id_middle, id_high];
+        self.0[..10].copy_from_slice(&header);
         let end = 10 + payload_len;
-        let crc = Crc::new().add(&self.0[1..end]).finish(M::EXTRA_CRC);
+        let crc = Crc::new().add(&self.0[1..end]).finish(crc_extra);
         self.0[end..end + 2].copy_from_slice(&crc.to_le_bytes());
         let bytes = &self.0[..end + 2];
         Frame::new(bytes, Header::read(bytes).expect("the header was just written"))

@@ -16,7 +16,7 @@ pub const MAX_FRAME_LEN: usize = 10 + 255 + 2 + 13;
 
 const HEADER_V1: usize = 6;
 const HEADER_V2: usize = 10;
-const CRC_LEN: usize = 2;
+pub(super) const CRC_LEN: usize = 2;
 const SIGNATURE_LEN: usize = 13;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

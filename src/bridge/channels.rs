@@ -1,0 +1,303 @@
+//! Channels and links as the core sees them: bytes in, frames out, everything counted.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use super::LinkIndex;
+use super::outbox::Outbox;
+use super::pacing::SerialQueue;
+use super::settings::{LinkSettings, Role, Transport};
+use crate::channel::{ChannelId, ChannelSet};
+use crate::timestamp::Timestamp;
+use crate::wire::decoder::Patience;
+use crate::wire::{Frame, MavId, StreamDecoder, WireCounters};
+
+/// A stream that is no serial line may hold the rest of a frame back for so long.
+const STREAM_PATIENCE: Duration = Duration::from_secs(1);
+
+/// So many pairs of message and source are limited in rate on one link.
+const MAX_RATE_ENTRIES: usize = 256;
+
+/// One open conversation.
+#[derive(Debug)]
+pub struct Channel {
+    pub link: LinkIndex,
+    pub address: String,
+    /// Where reads may cut frames; a datagram needs none.
+    pub decoder: Option<StreamDecoder>,
+    pub queue: Option<SerialQueue>,
+    pub last_heard: Option<Timestamp>,
+    /// The next sequence number of each of our components.
+    sequences: Vec<(u8, u8)>,
+}
+
+impl Channel {
+    /// The sequence number for a frame that `component` sends on this channel.
+    pub fn next_sequence(&mut self, component: u8) -> u8 {
+        match self.sequences.iter_mut().find(|(id, _)| *id == component) {
+            Some((_, next)) => {
+                let sequence = *next;
+                *next = next.wrapping_add(1);
+                sequence
+            }
+            None => {
+                self.sequences.push((component, 1));
+                0
+            }
+        }
+    }
+}
+
+/// One configured link with its counters.
+#[derive(Debug)]
+pub struct Link {
+    pub settings: LinkSettings,
+    pub up: bool,
+    pub reason: Option<String>,
+    pub rx_frames: u64,
+    pub rx_bytes: u64,
+    pub tx_frames: u64,
+    pub tx_bytes: u64,
+    /// Of channels that are closed; those of open streams are added when shown.
+    pub wire: WireCounters,
+    pub dropped: BTreeMap<&'static str, u64>,
+    rates: Vec<(u32, MavId, Timestamp)>,
+}
+
+impl Link {
+    fn new(settings: LinkSettings) -> Self {
+        Self {
+            settings,
+            up: false,
+            reason: None,
+            rx_frames: 0,
+            rx_bytes: 0,
+            tx_frames: 0,
+            tx_bytes: 0,
+            wire: WireCounters::default(),
+            dropped: BTreeMap::new(),
+            rates: Vec::new(),
+        }
+    }
+
+    pub fn count_dropped(&mut self, reason: &'static str) {
+        *self.dropped.entry(reason).or_default() += 1;
+    }
+
+    /// Whether a message may pass to this link now under its `max_rate_hz`; if so, it counts as sent.
+    fn admit(&mut self, now: Timestamp, message_id: u32, source: MavId) -> bool {
+        let Some(interval) = self.settings.max_rates.get(&message_id) else { return true };
+        match self.rates.iter_mut().find(|(id, from, _)| *id == message_id && *from == source) {
+            Some((_, _, next)) if *next > now => false,
+            Some((_, _, next)) => {
+                // A message a little late must not shift those behind it.
+                *next = (*next + *interval).max(now + interval.mul_f64(0.5));
+                true
+            }
+            None => {
+                if self.rates.len() >= MAX_RATE_ENTRIES {
+                    self.rates.clear();
+                }
+                self.rates.push((message_id, source, now + *interval));
+                true
+            }
+        }
+    }
+}
+
+/// All links and their open channels.
+#[derive(Debug)]
+pub struct Channels {
+    links: Vec<Link>,
+    channels: Vec<Option<Channel>>,
+    open: ChannelSet,
+    /// Channels with a decoder that may be waiting for the rest of a frame.
+    streams: ChannelSet,
+    /// Channels whose output is paced.
+    paced: ChannelSet,
+    by_role: [ChannelSet; 4],
+    /// Channels of links with a `max_rate_hz`.
+    limited: ChannelSet,
+}
+
+impl Channels {
+    pub fn new(links: Vec<LinkSettings>) -> Self {
+        let mut channels = Vec::new();
+        channels.resize_with(ChannelId::COUNT, || None);
+        Self {
+            links: links.into_iter().map(Link::new).collect(),
+            channels,
+            open: ChannelSet::EMPTY,
+            streams: ChannelSet::EMPTY,
+            paced: ChannelSet::EMPTY,
+            by_role: [ChannelSet::EMPTY; 4],
+            limited: ChannelSet::EMPTY,
+        }
+    }
+
+    pub fn links(&self) -> &[Link] {
+        &self.links
+    }
+
+    /// The link of that index, `None` for one that was never configured.
+    pub fn link_mut(&mut self, link: LinkIndex) -> Option<&mut Link> {
+        self.links.get_mut(link)
+    }
+
+    pub fn channel(&self, channel: ChannelId) -> Option<&Channel> {
+        self.channels[channel.index()].as_ref()
+    }
+
+    pub fn channel_mut(&mut self, channel: ChannelId) -> Option<&mut Channel> {
+        self.channels[channel.index()].as_mut()
+    }
+
+    /// The link that carries `channel`.
+    pub fn link_of(&self, channel: ChannelId) -> Option<(LinkIndex, &Link)> {
+        let link = self.channel(channel)?.link;
+        Some((link, &self.links[link]))
+    }
+
+    pub fn role(&self, channel: ChannelId) -> Option<Role> {
+        self.link_of(channel).map(|(_, link)| link.settings.role)
+    }
+
+    /// The open channels of links with that role.
+    pub fn with_role(&self, role: Role) -> ChannelSet {
+        self.by_role[role as usize]
+    }
+
+    pub fn open_set(&self) -> ChannelSet {
+        self.open
+    }
+
+    /// False when there is no such link.
+    pub fn open(&mut self, channel: ChannelId, link: LinkIndex, address: &str) -> bool {
+        let Some(settings) = self.links.get(link).map(|link| &link.settings) else { return false };
+        let (decoder, queue) = match settings.transport {
+            Transport::Datagrams => (None, None),
+            Transport::Stream => (Some(StreamDecoder::new(Patience::Fixed(STREAM_PATIENCE))), None),
+            Transport::Serial { baud } => {
+                (Some(StreamDecoder::new(Patience::Serial { baud })), Some(SerialQueue::new(baud)))
+            }
+        };
+        let (role, limited) = (settings.role, !settings.max_rates.is_empty());
+        self.close(channel);
+        self.open.insert(channel);
+        self.by_role[role as usize].insert(channel);
+        if decoder.is_some() {
+            self.streams.insert(channel);
+        }
+        if queue.is_some() {
+            self.paced.insert(channel);
+        }
+        if limited {
+            self.limited.insert(channel);
+        }
+        let address = address.to_owned();
+        let channel_state = Channel { link, address, decoder, queue, last_heard: None, sequences: Vec::new() };
+        self.channels[channel.index()] = Some(channel_state);
+        true
+    }
+
+    pub fn close(&mut self, channel: ChannelId) {
+        let Some(mut closed) = self.channels[channel.index()].take() else { return };
+        for set in
+            [&mut self.open, &mut self.streams, &mut self.paced, &mut self.limited].into_iter().chain(&mut self.by_role)
+        {
+            set.remove(channel);
+        }
+        let link = &mut self.links[closed.link];
+        if let Some(decoder) = &closed.decoder {
+            link.wire.add(decoder.counters());
+        }
+        if let Some(queue) = &mut closed.queue {
+            queue.clear();
+            for (reason, count) in queue.dropped() {
+                *link.dropped.entry(reason).or_default() += count;
+            }
+        }
+    }
+
+    /// Takes the channels out of `wanted` whose link has had its share of this message; they are counted.
+    pub fn limit_rate(&mut self, now: Timestamp, wanted: ChannelSet, frame: &Frame<'_>) -> ChannelSet {
+        let mut admitted = wanted;
+        for channel in wanted.intersection(self.limited) {
+            let Some(link) = self.channels[channel.index()].as_ref().map(|channel| channel.link) else { continue };
+            let link = &mut self.links[link];
+            if !link.admit(now, frame.message_id(), frame.source()) {
+                link.count_dropped("max_rate");
+                admitted.remove(channel);
+            }
+        }
+        admitted
+    }
+
+    /// Gives `frame` out on `wanted`: at once where the line is not paced, else when it is its turn.
+    pub fn transmit(&mut self, now: Timestamp, wanted: ChannelSet, frame: &Frame<'_>, outbox: &mut Outbox) {
+        let paced = wanted.intersection(self.paced);
+        let direct = wanted.without(self.paced).intersection(self.open);
+        for channel in direct {
+            self.count_sent(channel, frame.bytes().len());
+        }
+        outbox.push_frame(direct, frame.bytes());
+        for channel in paced {
+            if let Some(queue) = self.channels[channel.index()].as_mut().and_then(|channel| channel.queue.as_mut()) {
+                queue.push(now, frame);
+            }
+            self.pump(now, channel, outbox);
+        }
+    }
+
+    /// Gives out what the paced lines have room for.
+    pub fn pump_all(&mut self, now: Timestamp, outbox: &mut Outbox) {
+        for channel in self.paced {
+            self.pump(now, channel, outbox);
+        }
+    }
+
+    fn pump(&mut self, now: Timestamp, channel: ChannelId, outbox: &mut Outbox) {
+        let Some(state) = self.channels[channel.index()].as_mut() else { return };
+        let Some(queue) = state.queue.as_mut() else { return };
+        let link = &mut self.links[state.link];
+        while let Some(bytes) = queue.pop(now) {
+            link.tx_frames += 1;
+            link.tx_bytes += bytes.len() as u64;
+            outbox.push_frame(channel.into(), bytes);
+        }
+    }
+
+    fn count_sent(&mut self, channel: ChannelId, len: usize) {
+        if let Some(link) = self.channels[channel.index()].as_ref().map(|channel| channel.link) {
+            let link = &mut self.links[link];
+            link.tx_frames += 1;
+            link.tx_bytes += len as u64;
+        }
+    }
+
+    /// Whether no paced line has a frame left.
+    pub fn is_drained(&self) -> bool {
+        let mut queues = self.paced.filter_map(|channel| self.channel(channel)?.queue.as_ref()?.poll_timeout());
+        queues.next().is_none()
+    }
+
+    /// When a paced line has room, or a stream's unfinished frame is to be given up.
+    pub fn poll_timeout(&self) -> Option<Timestamp> {
+        let queues = self.paced.filter_map(|channel| self.channel(channel)?.queue.as_ref()?.poll_timeout());
+        let decoders = self.streams.filter_map(|channel| self.channel(channel)?.decoder.as_ref()?.poll_timeout());
+        queues.chain(decoders).min()
+    }
+
+    /// Streams whose unfinished frame is to be given up at `now`.
+    pub fn stalled(&self, now: Timestamp) -> ChannelSet {
+        self.streams
+            .filter(|channel| {
+                let decoder = self.channel(*channel).and_then(|channel| channel.decoder.as_ref());
+                decoder.and_then(StreamDecoder::poll_timeout).is_some_and(|at| at <= now)
+            })
+            .fold(ChannelSet::EMPTY, |mut set, channel| {
+                set.insert(channel);
+                set
+            })
+    }
+}

@@ -1,0 +1,210 @@
+//! Which gimbals there are, and which manager component each one has.
+//!
+//! One component per gimbal: device 154 has manager 191, 171 has 192, 172 has 193, 173 has 194; other gimbals take the
+//! free ones in the order of the configuration.
+
+use super::LinkIndex;
+use super::settings::Settings;
+use crate::gimbals::mavlink_v2::MavlinkV2Driver;
+use crate::gimbals::settings::GimbalSettings;
+use crate::gimbals::{DriverOutput, GimbalDriver};
+use crate::manager::settings::ControlSettings;
+use crate::manager::{DeviceState, GimbalManager, ManagerOutput};
+use crate::timestamp::Timestamp;
+use crate::wire::MavId;
+use crate::wire::ids::component;
+
+/// A gimbal with its manager and driver.
+#[derive(Debug)]
+pub struct Gimbal {
+    pub manager: GimbalManager,
+    pub driver: Box<dyn GimbalDriver>,
+    /// The manager's component id.
+    pub component: u8,
+    /// It has an entry in the configuration, and is missed when it is not there.
+    pub configured: bool,
+}
+
+impl Gimbal {
+    fn new(settings: GimbalSettings, rules: &ControlSettings, component: u8, configured: bool) -> Self {
+        Self {
+            manager: GimbalManager::new(settings, rules.clone()),
+            driver: Box::new(MavlinkV2Driver::new()),
+            component,
+            configured,
+        }
+    }
+
+    /// Whether its manager sends heartbeats: 191 always does, others from when their gimbal is known.
+    pub fn beats(&self) -> bool {
+        self.component == component::ONBOARD_COMPUTER || self.manager.device().is_some()
+    }
+
+    pub fn poll_timeout(&self) -> Option<Timestamp> {
+        [self.manager.poll_timeout(), self.driver.poll_timeout()].into_iter().flatten().min()
+    }
+
+    pub fn poll_output(&mut self) -> Option<GimbalOutput> {
+        if let Some(output) = self.driver.poll_output() {
+            return Some(GimbalOutput::Driver(output));
+        }
+        self.manager.poll_output().map(GimbalOutput::Manager)
+    }
+}
+
+/// What a gimbal's driver or manager wants done.
+#[derive(Debug)]
+pub enum GimbalOutput {
+    Driver(DriverOutput),
+    Manager(ManagerOutput),
+}
+
+/// All gimbals.
+#[derive(Debug)]
+pub struct Roster {
+    gimbals: Vec<Gimbal>,
+    rules: ControlSettings,
+}
+
+/// No component id is left for the manager of another gimbal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NoManagerLeft;
+
+impl Roster {
+    pub fn new(settings: &Settings) -> Self {
+        let mut roster = Self { gimbals: Vec::new(), rules: settings.control.clone() };
+        let mut wanted: Vec<Option<u8>> = settings
+            .gimbals
+            .iter()
+            .map(|gimbal| gimbal.manager_component_id.or(gimbal.component_id.and_then(manager_of_device)))
+            .collect();
+        for at in 0..wanted.len() {
+            if wanted[at].is_none() {
+                wanted[at] = (component::ONBOARD_COMPUTER..=component::ONBOARD_COMPUTER4)
+                    .find(|free| !wanted.contains(&Some(*free)));
+            }
+        }
+        for (gimbal, component) in settings.gimbals.iter().zip(wanted) {
+            let component = component.expect("the configuration was refused when a manager component is missing");
+            roster.gimbals.push(Gimbal::new(gimbal.clone(), &settings.control, component, true));
+        }
+        roster.ensure_first_manager();
+        roster
+    }
+
+    pub fn iter(&self) -> impl Iterator<Item = &Gimbal> {
+        self.gimbals.iter()
+    }
+
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut Gimbal> {
+        self.gimbals.iter_mut()
+    }
+
+    pub fn len(&self) -> usize {
+        self.gimbals.len()
+    }
+
+    pub fn get_mut(&mut self, at: usize) -> &mut Gimbal {
+        &mut self.gimbals[at]
+    }
+
+    /// The gimbal whose device that is.
+    pub fn of_device(&mut self, device: MavId) -> Option<&mut Gimbal> {
+        self.gimbals.iter_mut().find(|gimbal| gimbal.manager.device() == Some(device))
+    }
+
+    /// Whether `id` is a managed device.
+    pub fn is_device(&self, id: MavId) -> bool {
+        self.gimbals.iter().any(|gimbal| gimbal.manager.device() == Some(id))
+    }
+
+    /// Whether `component` is one of our managers.
+    pub fn has_manager(&self, component: u8) -> bool {
+        self.gimbals.iter().any(|gimbal| gimbal.component == component)
+    }
+
+    /// The gimbal for a device heard on `link`, which is given to its driver; new ones are made as they are needed.
+    pub fn adopt(&mut self, now: Timestamp, device: MavId, link: LinkIndex) -> Result<&mut Gimbal, NoManagerLeft> {
+        let at = match self.place_for(device, link) {
+            Some(at) => at,
+            None => {
+                let component = self.free_manager(device).ok_or(NoManagerLeft)?;
+                let settings = GimbalSettings::found(format!("gimbal-{}", device.component));
+                self.gimbals.push(Gimbal::new(settings, &self.rules, component, false));
+                self.gimbals.len() - 1
+            }
+        };
+        self.gimbals[at].driver.adopt(now, device);
+        Ok(&mut self.gimbals[at])
+    }
+
+    fn place_for(&self, device: MavId, link: LinkIndex) -> Option<usize> {
+        let fits = |gimbal: &Gimbal| {
+            let settings = gimbal.manager.settings();
+            let free = gimbal.manager.device().is_none()
+                || (gimbal.manager.state() == DeviceState::Lost && settings.component_id == Some(device.component));
+            free && settings.link.is_none_or(|wanted| wanted == link)
+        };
+        let named = |gimbal: &Gimbal| gimbal.manager.settings().component_id == Some(device.component);
+        let unnamed = |gimbal: &Gimbal| gimbal.configured && gimbal.manager.settings().component_id.is_none();
+        let spare =
+            |gimbal: &Gimbal| !gimbal.configured && manager_of_device(device.component) == Some(gimbal.component);
+        let position =
+            |wanted: &dyn Fn(&Gimbal) -> bool| self.gimbals.iter().position(|gimbal| fits(gimbal) && wanted(gimbal));
+        position(&named).or_else(|| position(&unnamed)).or_else(|| position(&spare))
+    }
+
+    /// The manager component for a device without an entry.
+    fn free_manager(&self, device: MavId) -> Option<u8> {
+        let free = |component: &u8| !self.has_manager(*component);
+        manager_of_device(device.component)
+            .filter(free)
+            .or_else(|| (component::ONBOARD_COMPUTER..=component::ONBOARD_COMPUTER4).find(free))
+    }
+
+    /// 191 answers clients from the start, before any gimbal is there; unless the user gave the managers other ids.
+    fn ensure_first_manager(&mut self) {
+        let first = component::ONBOARD_COMPUTER;
+        let chosen = self.gimbals.iter().any(|gimbal| gimbal.manager.settings().manager_component_id.is_some());
+        if !self.has_manager(first) && !chosen {
+            let settings = GimbalSettings::found(format!("gimbal-{}", component::GIMBAL));
+            self.gimbals.push(Gimbal::new(settings, &self.rules, first, false));
+        }
+    }
+}
+
+/// The manager component that goes with a v2 device's own.
+pub const fn manager_of_device(device: u8) -> Option<u8> {
+    match device {
+        component::GIMBAL => Some(component::ONBOARD_COMPUTER),
+        component::GIMBAL2..=component::GIMBAL4 => Some(device - component::GIMBAL2 + component::ONBOARD_COMPUTER + 1),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// D1: "Device 154 has manager 191, 171 has 192, 172 has 193, 173 has 194".
+    #[test]
+    fn each_device_has_its_manager() {
+        let expected =
+            [(154, Some(191)), (171, Some(192)), (172, Some(193)), (173, Some(194)), (174, None), (50, None)];
+        for (device, manager) in expected {
+            assert_eq!(manager_of_device(device), manager, "device {device}");
+        }
+    }
+
+    /// D1: "other gimbals take the free ones in file order".
+    #[test]
+    fn found_devices_take_the_manager_of_their_id() {
+        let mut roster = Roster::new(&Settings::default());
+        let component = |roster: &mut Roster, device: u8| {
+            let device = MavId::new(1, device);
+            roster.adopt(Timestamp::ZERO, device, 0).map(|gimbal| gimbal.component)
+        };
+        assert_eq!(component(&mut roster, 171), Ok(192));
+        assert_eq!(component(&mut roster, 154), Ok(191));
+    }
+}

@@ -1,0 +1,24 @@
+//! What a gimbal can do.
+
+use crate::geometry::Limits;
+use crate::wire::ids::CapFlags;
+
+/// Capabilities and end stops as the device states them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Capabilities {
+    pub flags: CapFlags,
+    pub limits: Limits,
+}
+
+impl Capabilities {
+    /// What is assumed of a gimbal that reports its attitude and never says what it can do: pitch and yaw, held to
+    /// the horizon, following the vehicle.
+    pub fn assumed() -> Self {
+        let flags = CapFlags::HAS_ROLL_LOCK
+            | CapFlags::HAS_PITCH_AXIS
+            | CapFlags::HAS_PITCH_LOCK
+            | CapFlags::HAS_YAW_AXIS
+            | CapFlags::HAS_YAW_FOLLOW;
+        Self { flags, limits: Limits::default() }
+    }
+}

@@ -1,0 +1,35 @@
+//! The one trait behind which every gimbal family stands.
+
+use super::report::Report;
+use super::setpoint::Setpoint;
+use crate::timestamp::Timestamp;
+use crate::wire::dialect::MavMessage;
+use crate::wire::{Frame, MavId};
+
+/// The conversation with one gimbal.
+///
+/// One call of a `handle_*`, then [`poll_output`](Self::poll_output) until it is `None`.
+pub trait GimbalDriver: std::fmt::Debug {
+    /// The component this driver is to talk to.
+    fn adopt(&mut self, now: Timestamp, device: MavId);
+
+    /// A frame that the device sent.
+    fn handle_received(&mut self, now: Timestamp, frame: &Frame<'_>);
+
+    /// An order, in a yaw frame that the device accepts.
+    fn handle_setpoint(&mut self, now: Timestamp, setpoint: Setpoint);
+
+    fn handle_timeout(&mut self, now: Timestamp);
+
+    fn poll_output(&mut self) -> Option<DriverOutput>;
+
+    fn poll_timeout(&self) -> Option<Timestamp>;
+}
+
+/// What a driver wants done.
+#[derive(Clone, Debug, PartialEq)]
+pub enum DriverOutput {
+    /// To be sent in the manager's name, on the device's link only.
+    Message(Box<MavMessage>),
+    Report(Report),
+}

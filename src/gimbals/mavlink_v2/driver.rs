@@ -1,0 +1,269 @@
+//! The conversation with a v2 gimbal device: discovery, supervision, setpoints.
+//!
+//! Follows "Discovery of gimbal device" of the Gimbal Protocol v2: ask for 283 until it comes, keep an eye on 285.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use super::packet::{self, DeviceStatus};
+use crate::geometry::Angle;
+use crate::gimbals::capabilities::Capabilities;
+use crate::gimbals::driver::{DriverOutput, GimbalDriver};
+use crate::gimbals::report::{GimbalStatus, Identity, Report};
+use crate::gimbals::setpoint::Setpoint;
+use crate::timers::TimerTable;
+use crate::timestamp::Timestamp;
+use crate::wire::dialect::MavMessage;
+use crate::wire::ids::{CapFlags, GimbalFlags, message};
+use crate::wire::{Frame, MavId, Target};
+
+/// A device not heard for so long is lost.
+pub const LOST_AFTER: Duration = Duration::from_secs(3);
+
+/// 283 is asked for so often …
+const ASK_EVERY: Duration = Duration::from_secs(1);
+/// … for so long …
+const ASK_EAGERLY_FOR: Duration = Duration::from_secs(30);
+/// … and so often from then on, for ever.
+const ASK_PATIENTLY_EVERY: Duration = Duration::from_secs(5);
+
+/// The first requests go to everybody, as the guide has it; then to the one device heard.
+const BROADCAST_REQUESTS: u32 = 2;
+
+/// A device that sends 285 and never 283 is used all the same after so long.
+const USABLE_WITHOUT_INFORMATION_AFTER: Duration = Duration::from_secs(5);
+
+/// 285 is counted over such a time …
+const RATE_WINDOW: Duration = Duration::from_secs(5);
+/// … and should come at least so often …
+const LEAST_STATUS_RATE_HZ: u32 = 5;
+/// … or is asked for at this interval, once.
+const WANTED_STATUS_INTERVAL: Duration = Duration::from_millis(100);
+
+/// A time since boot that jumps back further means that the device was restarted.
+const REBOOT_STEP_MS: u32 = 1_000;
+
+/// Drives one v2 gimbal device.
+#[derive(Debug, Default)]
+pub struct MavlinkV2Driver {
+    device: Option<MavId>,
+    alive: bool,
+    /// Something was said of its capabilities: by itself, or by our patience.
+    known: bool,
+    informed: bool,
+    first_status: Option<Timestamp>,
+    asking_since: Timestamp,
+    requests: u32,
+    boot_ms: Option<u32>,
+    statuses_in_window: u32,
+    rate_asked: bool,
+    capabilities: Option<Capabilities>,
+    /// It has set a frame bit, so it is newer than them.
+    sets_frame_bits: bool,
+    /// Its `delta_yaw` was not zero once, so it does fill it in.
+    fills_delta_yaw: bool,
+    timers: TimerTable<Timer>,
+    outputs: VecDeque<DriverOutput>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Timer {
+    /// When to ask for 283 again.
+    AskInformation,
+    /// When to call the device lost.
+    Lost,
+    /// When to do without 283.
+    UseWithoutInformation,
+    /// When to judge the rate of 285.
+    CheckRate,
+}
+
+impl MavlinkV2Driver {
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    fn handle_heard(&mut self, now: Timestamp, device: MavId) {
+        self.timers.set(Timer::Lost, now + LOST_AFTER);
+        if self.alive {
+            return;
+        }
+        self.alive = true;
+        self.outputs.push_back(DriverOutput::Report(Report::Alive { device }));
+        self.timers.set(Timer::CheckRate, now + RATE_WINDOW);
+        self.statuses_in_window = 0;
+        self.rate_asked = false;
+        self.ask_anew(now);
+    }
+
+    fn ask_anew(&mut self, now: Timestamp) {
+        self.informed = false;
+        self.first_status = None;
+        self.asking_since = now;
+        self.requests = 0;
+        self.timers.set(Timer::AskInformation, now);
+    }
+
+    fn handle_boot_time(&mut self, now: Timestamp, boot_ms: u32) {
+        let before = self.boot_ms.replace(boot_ms);
+        if before.is_some_and(|before| before.wrapping_sub(boot_ms) > REBOOT_STEP_MS && boot_ms < before) {
+            self.fills_delta_yaw = false;
+            self.rate_asked = false;
+            self.ask_anew(now);
+        }
+    }
+
+    fn handle_information(&mut self, now: Timestamp, frame: &Frame<'_>) {
+        let Some(information) = packet::read_information(frame) else { return };
+        if information.gimbal_device_id != 0 {
+            return;
+        }
+        self.handle_boot_time(now, information.boot_ms);
+        self.informed = true;
+        self.timers.cancel(Timer::AskInformation);
+        self.timers.cancel(Timer::UseWithoutInformation);
+        self.become_known(information.identity, information.capabilities);
+    }
+
+    fn become_known(&mut self, identity: Identity, capabilities: Capabilities) {
+        self.known = true;
+        self.capabilities = Some(capabilities);
+        self.outputs.push_back(DriverOutput::Report(Report::Known(identity, capabilities)));
+    }
+
+    fn handle_status(&mut self, now: Timestamp, frame: &Frame<'_>) {
+        let Some(status) = packet::read_status(frame) else { return };
+        if status.gimbal_device_id != 0 {
+            return;
+        }
+        self.handle_boot_time(now, status.boot_ms);
+        self.statuses_in_window += 1;
+        if self.first_status.is_none() && !self.informed {
+            self.first_status = Some(now);
+            self.timers.set(Timer::UseWithoutInformation, now + USABLE_WITHOUT_INFORMATION_AFTER);
+        }
+        self.sets_frame_bits |=
+            status.flags.intersects(GimbalFlags::YAW_IN_VEHICLE_FRAME | GimbalFlags::YAW_IN_EARTH_FRAME);
+        let Some(attitude) = status.attitude else { return };
+        let heading = self.trusted_heading(&status);
+        let accepts_earth_yaw = self.accepts_earth_yaw(status.flags);
+        self.outputs.push_back(DriverOutput::Report(Report::Attitude(GimbalStatus {
+            attitude,
+            rates: status.rates,
+            heading,
+            flags: status.flags,
+            failures: status.failures,
+            accepts_earth_yaw,
+        })));
+    }
+
+    /// `delta_yaw` counts only beside a frame bit and where the frame really carried it: a field cut off reads 0,
+    /// which is also North.
+    fn trusted_heading(&mut self, status: &DeviceStatus) -> Option<Angle> {
+        let delta_yaw = status.delta_yaw?;
+        if !status.flags.intersects(GimbalFlags::YAW_IN_VEHICLE_FRAME | GimbalFlags::YAW_IN_EARTH_FRAME) {
+            return None;
+        }
+        self.fills_delta_yaw |= delta_yaw.radians() != 0.0;
+        (status.extended || self.fills_delta_yaw).then_some(delta_yaw)
+    }
+
+    /// A new device says so in its status, moment by moment; an old one can do what it has a lock for.
+    fn accepts_earth_yaw(&self, flags: GimbalFlags) -> bool {
+        if self.sets_frame_bits {
+            flags.contains(GimbalFlags::ACCEPTS_YAW_IN_EARTH_FRAME)
+        } else {
+            self.capabilities.is_some_and(|capabilities| capabilities.flags.contains(CapFlags::HAS_YAW_LOCK))
+        }
+    }
+
+    fn send(&mut self, message: MavMessage) {
+        self.outputs.push_back(DriverOutput::Message(Box::new(message)));
+    }
+
+    fn ask_information(&mut self, now: Timestamp) {
+        let Some(device) = self.device else { return };
+        let target = if self.requests < BROADCAST_REQUESTS { Target::Everyone } else { Target::Component(device) };
+        self.requests += 1;
+        self.send(packet::request_message(target, message::GIMBAL_DEVICE_INFORMATION));
+        let eager = now.since(self.asking_since) < ASK_EAGERLY_FOR;
+        self.timers.set(Timer::AskInformation, now + if eager { ASK_EVERY } else { ASK_PATIENTLY_EVERY });
+    }
+
+    fn check_rate(&mut self, now: Timestamp) {
+        let Some(device) = self.device else { return };
+        let enough = LEAST_STATUS_RATE_HZ * RATE_WINDOW.as_secs() as u32;
+        if self.statuses_in_window < enough && !self.rate_asked {
+            self.rate_asked = true;
+            let target = Target::Component(device);
+            let wanted = message::GIMBAL_DEVICE_ATTITUDE_STATUS;
+            self.send(packet::set_message_interval(target, wanted, WANTED_STATUS_INTERVAL));
+        }
+        self.statuses_in_window = 0;
+        self.timers.set(Timer::CheckRate, now + RATE_WINDOW);
+    }
+
+    fn lose(&mut self) {
+        self.alive = false;
+        self.boot_ms = None;
+        for timer in [Timer::AskInformation, Timer::UseWithoutInformation, Timer::CheckRate] {
+            self.timers.cancel(timer);
+        }
+        self.outputs.push_back(DriverOutput::Report(Report::Lost));
+    }
+}
+
+impl GimbalDriver for MavlinkV2Driver {
+    fn adopt(&mut self, _now: Timestamp, device: MavId) {
+        *self = Self { device: Some(device), outputs: std::mem::take(&mut self.outputs), ..Self::default() };
+    }
+
+    fn handle_received(&mut self, now: Timestamp, frame: &Frame<'_>) {
+        if Some(frame.source()) != self.device {
+            return;
+        }
+        match frame.message_id() {
+            message::HEARTBEAT => self.handle_heard(now, frame.source()),
+            message::GIMBAL_DEVICE_INFORMATION => {
+                self.handle_heard(now, frame.source());
+                self.handle_information(now, frame);
+            }
+            message::GIMBAL_DEVICE_ATTITUDE_STATUS => {
+                self.handle_heard(now, frame.source());
+                self.handle_status(now, frame);
+            }
+            _ => {}
+        }
+        self.handle_timeout(now);
+    }
+
+    fn handle_setpoint(&mut self, _now: Timestamp, setpoint: Setpoint) {
+        if let Some(device) = self.device
+            && self.alive
+        {
+            self.send(packet::set_attitude(device, &setpoint));
+        }
+    }
+
+    fn handle_timeout(&mut self, now: Timestamp) {
+        while let Some(timer) = self.timers.pop_due(now) {
+            match timer {
+                Timer::AskInformation => self.ask_information(now),
+                Timer::Lost => self.lose(),
+                Timer::UseWithoutInformation if !self.known => {
+                    self.become_known(Identity::default(), Capabilities::assumed());
+                }
+                Timer::UseWithoutInformation => {}
+                Timer::CheckRate => self.check_rate(now),
+            }
+        }
+    }
+
+    fn poll_output(&mut self) -> Option<DriverOutput> {
+        self.outputs.pop_front()
+    }
+
+    fn poll_timeout(&self) -> Option<Timestamp> {
+        self.timers.next().map(|(at, _)| at)
+    }
+}

@@ -1,0 +1,67 @@
+//! What a gimbal tells about itself.
+
+use crate::geometry::{Angle, AngularRate, Attitude, EarthFrame, GimbalAngles, VehicleFrame, Yaw};
+use crate::gimbals::capabilities::Capabilities;
+use crate::wire::MavId;
+use crate::wire::ids::{FailureFlags, GimbalFlags};
+
+/// News from a driver.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Report {
+    /// The device is there: heard for the first time, or again after it was lost.
+    Alive {
+        device: MavId,
+    },
+    /// Enough is known of the device to steer it, or something of that has changed.
+    Known(Identity, Capabilities),
+    Attitude(GimbalStatus),
+    /// Nothing was heard of it for too long.
+    Lost,
+}
+
+/// Who made the device, as it says.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Identity {
+    pub vendor: String,
+    pub model: String,
+    pub custom_name: String,
+    /// Major, minor, patch, development.
+    pub firmware: Option<[u8; 4]>,
+}
+
+/// The device's attitude and state (`GIMBAL_DEVICE_ATTITUDE_STATUS` or its equivalent).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GimbalStatus {
+    pub attitude: GimbalAttitude,
+    /// Roll, pitch and yaw rate where the device knows them.
+    pub rates: [Option<AngularRate>; 3],
+    /// The device's own estimate of the vehicle's heading, where it is to be trusted.
+    pub heading: Option<Angle>,
+    pub flags: GimbalFlags,
+    pub failures: FailureFlags,
+    /// The device takes yaw from North at this moment.
+    pub accepts_earth_yaw: bool,
+}
+
+/// A gimbal's attitude in the frame in which it was reported.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum GimbalAttitude {
+    InVehicleFrame(Attitude<VehicleFrame>),
+    InEarthFrame(Attitude<EarthFrame>),
+}
+
+impl GimbalAttitude {
+    pub fn angles(self) -> GimbalAngles {
+        match self {
+            Self::InVehicleFrame(attitude) => attitude.gimbal_angles(),
+            Self::InEarthFrame(attitude) => attitude.gimbal_angles(),
+        }
+    }
+
+    pub fn yaw(self) -> Yaw {
+        match self {
+            Self::InVehicleFrame(attitude) => Yaw::InVehicleFrame(attitude.gimbal_angles().yaw),
+            Self::InEarthFrame(attitude) => Yaw::InEarthFrame(attitude.gimbal_angles().yaw),
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! What a gimbal is told.
+
+use crate::geometry::{Angle, AngularRate, Yaw, YawFrame};
+use crate::wire::ids::GimbalFlags;
+
+/// One order to a gimbal, the same for every family.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Setpoint {
+    /// To the safe position, stabilisation off.
+    Retract,
+    /// To the device's own idea of straight ahead.
+    Neutral,
+    Point(Pointing),
+    Turn(Turning),
+}
+
+/// An attitude to take and keep, in yaw-roll-pitch order.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pointing {
+    pub roll: Angle,
+    pub pitch: Angle,
+    /// Its frame also says what it is kept to: the vehicle's nose, or North.
+    pub yaw: Yaw,
+    pub stabilised: Stabilised,
+}
+
+/// A continuous rotation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Turning {
+    /// `None` where nobody asked for a roll rate.
+    pub roll: Option<AngularRate>,
+    pub pitch: AngularRate,
+    pub yaw: AngularRate,
+    pub yaw_frame: YawFrame,
+    pub stabilised: Stabilised,
+}
+
+/// Which axes are held to the horizon rather than to the airframe (`ROLL_LOCK`, `PITCH_LOCK`).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stabilised {
+    pub roll: bool,
+    pub pitch: bool,
+}
+
+impl Stabilised {
+    pub const BOTH: Self = Self { roll: true, pitch: true };
+}
+
+impl Setpoint {
+    /// The flags as 284 and 281 show them: exactly one frame bit, and `YAW_LOCK` exactly with the earth frame.
+    pub fn flags(&self) -> GimbalFlags {
+        match *self {
+            Setpoint::Retract => GimbalFlags::RETRACT | frame_flags(YawFrame::Vehicle) | lock_flags(Stabilised::BOTH),
+            Setpoint::Neutral => GimbalFlags::NEUTRAL | frame_flags(YawFrame::Vehicle) | lock_flags(Stabilised::BOTH),
+            Setpoint::Point(pointing) => frame_flags(pointing.yaw.frame()) | lock_flags(pointing.stabilised),
+            Setpoint::Turn(turning) => frame_flags(turning.yaw_frame) | lock_flags(turning.stabilised),
+        }
+    }
+}
+
+fn frame_flags(frame: YawFrame) -> GimbalFlags {
+    match frame {
+        YawFrame::Vehicle => GimbalFlags::YAW_IN_VEHICLE_FRAME,
+        YawFrame::Earth => GimbalFlags::YAW_IN_EARTH_FRAME | GimbalFlags::YAW_LOCK,
+    }
+}
+
+fn lock_flags(stabilised: Stabilised) -> GimbalFlags {
+    let mut flags = GimbalFlags::empty();
+    flags.set(GimbalFlags::ROLL_LOCK, stabilised.roll);
+    flags.set(GimbalFlags::PITCH_LOCK, stabilised.pitch);
+    flags
+}
+
+/// What yaw is measured from; the frame bits decide, `YAW_LOCK` for senders older than them. Both bits at once mean
+/// nothing: `None`.
+pub fn yaw_frame(flags: GimbalFlags) -> Option<YawFrame> {
+    let vehicle = flags.contains(GimbalFlags::YAW_IN_VEHICLE_FRAME);
+    let earth = flags.contains(GimbalFlags::YAW_IN_EARTH_FRAME);
+    match (vehicle, earth) {
+        (true, true) => None,
+        (true, false) => Some(YawFrame::Vehicle),
+        (false, true) => Some(YawFrame::Earth),
+        (false, false) if flags.contains(GimbalFlags::YAW_LOCK) => Some(YawFrame::Earth),
+        (false, false) => Some(YawFrame::Vehicle),
+    }
+}

@@ -1,0 +1,114 @@
+//! A snapshot with everything in it, for tests.
+
+use std::collections::BTreeMap;
+
+use crate::bridge::snapshot::{
+    AttitudeSnapshot, GimbalSnapshot, LinkSnapshot, PeerSnapshot, RoiSnapshot, SetpointSnapshot, Snapshot,
+    VehicleSnapshot,
+};
+
+/// Two links, of which one is down; one gimbal that is held, and one that is searched for.
+pub fn snapshot() -> Snapshot {
+    Snapshot {
+        version: "0.1.0".into(),
+        uptime_s: 3725.5,
+        system_id: Some(1),
+        links: vec![autopilot_link(), gimbal_link()],
+        vehicle: VehicleSnapshot {
+            system_id: Some(1),
+            autopilot: Some("ardupilot".into()),
+            alive: true,
+            roll_deg: Some(2.5),
+            pitch_deg: Some(-1.25),
+            heading_deg: Some(87.0),
+            attitude_age_ms: Some(12),
+            latitude_deg: Some(47.397_742),
+            longitude_deg: Some(8.545_594),
+            altitude_amsl_m: Some(488.5),
+            position_age_ms: Some(95),
+            yaw_rate_dps: Some(3.5),
+        },
+        gimbals: vec![held_gimbal(), searched_gimbal()],
+        conflicts: vec!["1/191 is also used by 10.0.0.7: set its component id to another value".into()],
+    }
+}
+
+fn autopilot_link() -> LinkSnapshot {
+    LinkSnapshot {
+        name: "autopilot".into(),
+        role: "autopilot".into(),
+        endpoint: "udpin:0.0.0.0:14540".into(),
+        state: "up".into(),
+        reason: None,
+        rx_frames: 123_456,
+        tx_frames: 7_890,
+        rx_bytes: 4_938_240,
+        tx_bytes: 315_600,
+        crc_errors: 2,
+        resync_bytes: 17,
+        dropped_frames: 40,
+        dropped: BTreeMap::from([("duplicate".into(), 3), ("queue_full".into(), 37)]),
+        peers: vec![PeerSnapshot {
+            address: "127.0.0.1:14550".into(),
+            components: vec!["1/1".into()],
+            age_ms: Some(3),
+        }],
+    }
+}
+
+fn gimbal_link() -> LinkSnapshot {
+    LinkSnapshot {
+        name: "gimbal".into(),
+        role: "gimbal".into(),
+        endpoint: "serial:/dev/serial0:115200".into(),
+        state: "down".into(),
+        reason: Some("no such file or directory".into()),
+        ..LinkSnapshot::default()
+    }
+}
+
+fn held_gimbal() -> GimbalSnapshot {
+    GimbalSnapshot {
+        name: "camera".into(),
+        family: "mavlink_v2".into(),
+        manager_component_id: 191,
+        device_id: Some(154),
+        device: Some("1/154".into()),
+        state: "alive".into(),
+        vendor: Some("Acme".into()),
+        model: Some("Pixy".into()),
+        firmware: Some("7.8.1".into()),
+        attitude: AttitudeSnapshot {
+            roll_deg: Some(0.25),
+            pitch_deg: Some(-42.5),
+            yaw_vehicle_deg: Some(30.0),
+            yaw_earth_deg: Some(117.0),
+            age_ms: Some(18),
+        },
+        setpoint: Some(SetpointSnapshot {
+            mode: "angle".into(),
+            pitch_deg: Some(-45.0),
+            yaw_deg: Some(120.0),
+            yaw_frame: Some("earth".into()),
+            pitch_rate_dps: None,
+            yaw_rate_dps: None,
+            source: Some("255/190".into()),
+        }),
+        primary: Some("255/190".into()),
+        secondary: None,
+        roi: Some(RoiSnapshot { latitude_deg: 47.4, longitude_deg: 8.55, altitude_amsl_m: 430.0 }),
+        flags: vec!["yaw_lock".into(), "roll_lock".into()],
+        failure_flags: vec!["motor_error".into()],
+        rejected: BTreeMap::from([("1/100".into(), BTreeMap::from([("not_in_control".into(), 12)]))]),
+    }
+}
+
+fn searched_gimbal() -> GimbalSnapshot {
+    GimbalSnapshot {
+        name: "lamp".into(),
+        family: "auto".into(),
+        manager_component_id: 192,
+        state: "searching".into(),
+        ..GimbalSnapshot::default()
+    }
+}

@@ -1,0 +1,160 @@
+//! Listens, and keeps every client within bounds.
+//!
+//! `axum::serve` knows neither time-outs nor a limit of connections, so hyper is driven here. A client may be slow to
+//! ask ([`Limits::header`]), slow to read, or stay ([`Limits::lifetime`]); what is beyond [`Limits::connections`] waits
+//! in the kernel until a place is free, which these limits make sure of.
+
+use std::io;
+use std::net::SocketAddr;
+use std::pin::pin;
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::Router;
+use hyper::server::conn::http1;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
+use tokio::net::{TcpListener, TcpSocket, TcpStream};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::time::{sleep, timeout};
+use tracing::{debug, info, warn};
+
+use super::fresh::FreshSnapshots;
+use super::routes;
+use crate::daemon::window::CoreHandle;
+
+/// Connections that the kernel holds until they are accepted.
+const BACKLOG: u32 = 64;
+
+/// The headers of a request, all together; a browser sends about 1 KiB.
+const REQUEST_BYTES: usize = 16 * 1024;
+
+/// What clients may take, and how patient we are.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Between two attempts to open the port.
+    pub retry: Duration,
+    /// Served at once.
+    pub connections: usize,
+    /// From the end of one answer, or from connecting, to the end of the next request's headers.
+    pub header: Duration,
+    /// After so long a connection is closed at its next answer.
+    pub lifetime: Duration,
+    /// How long that answer may take to be read.
+    pub farewell: Duration,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            retry: Duration::from_secs(2),
+            connections: 32,
+            header: Duration::from_secs(5),
+            lifetime: Duration::from_secs(30),
+            farewell: Duration::from_secs(2),
+        }
+    }
+}
+
+/// Serves until the core has dropped its ends of `core`.
+pub async fn run(listen: SocketAddr, core: CoreHandle, limits: Limits) {
+    let requests = core.requests.clone();
+    tokio::select! {
+        () = requests.closed() => {}
+        () = async { attend(open(listen, limits.retry).await, listen, core, limits).await } => {}
+    }
+}
+
+/// Serves those who come to `listener`; `listen` is the address that they were told.
+pub async fn attend(listener: TcpListener, listen: SocketAddr, core: CoreHandle, limits: Limits) {
+    let (snapshots, collector) = FreshSnapshots::of(core);
+    tokio::join!(collector.run(), serve(listener, routes::router(snapshots, listen), limits));
+}
+
+/// Tries until it succeeds; says once for each kind of failure what to do about it.
+async fn open(listen: SocketAddr, retry: Duration) -> TcpListener {
+    let mut told = None;
+    loop {
+        let error = match bind(listen) {
+            Ok(listener) => {
+                info!(%listen, "the status page can be opened");
+                return listener;
+            }
+            Err(error) => error,
+        };
+        if told != Some(error.kind()) {
+            told = Some(error.kind());
+            warn!(%listen, %error, remedy = remedy(error.kind()), "the status page cannot be opened, trying again");
+        }
+        sleep(retry).await;
+    }
+}
+
+fn bind(listen: SocketAddr) -> io::Result<TcpListener> {
+    let socket = if listen.is_ipv4() { TcpSocket::new_v4()? } else { TcpSocket::new_v6()? };
+    socket.set_reuseaddr(true)?;
+    socket.bind(listen)?;
+    socket.listen(BACKLOG)
+}
+
+fn remedy(kind: io::ErrorKind) -> &'static str {
+    match kind {
+        io::ErrorKind::AddrInUse => {
+            "another program listens there (`ss -ltnp` names it): stop it or set another [http] listen"
+        }
+        io::ErrorKind::AddrNotAvailable => {
+            "no network interface has this address yet: bring it up or set another [http] listen"
+        }
+        io::ErrorKind::PermissionDenied => "ports below 1024 are reserved: set a higher port in [http] listen",
+        _ => "check [http] listen",
+    }
+}
+
+async fn serve(listener: TcpListener, router: Router, limits: Limits) {
+    let places = Arc::new(Semaphore::new(limits.connections));
+    let mut failing = false;
+    loop {
+        let place = Arc::clone(&places).acquire_owned().await.expect("the semaphore is never closed");
+        match listener.accept().await {
+            Ok((stream, peer)) => {
+                failing = false;
+                debug!(%peer, "connection accepted");
+                tokio::spawn(converse(stream, router.clone(), limits, place));
+            }
+            Err(error) => {
+                if !failing {
+                    failing = true;
+                    warn!(%error, "connections to the status page cannot be accepted, trying again");
+                }
+                // Out of file descriptors: the connection stays in the kernel and would be offered again at once.
+                sleep(Duration::from_millis(100)).await;
+            }
+        }
+    }
+}
+
+async fn converse(stream: TcpStream, router: Router, limits: Limits, _place: OwnedSemaphorePermit) {
+    if let Err(error) = stream.set_nodelay(true) {
+        debug!(%error, "answers may come late");
+    }
+    let service = TowerToHyperService::new(router);
+    let connection = http1::Builder::new()
+        .timer(TokioTimer::new())
+        .header_read_timeout(limits.header)
+        .max_buf_size(REQUEST_BYTES)
+        .serve_connection(TokioIo::new(stream), service);
+    let mut connection = pin!(connection);
+    let result = match timeout(limits.lifetime, connection.as_mut()).await {
+        Ok(result) => result,
+        Err(_) => {
+            connection.as_mut().graceful_shutdown();
+            match timeout(limits.farewell, connection).await {
+                Ok(result) => result,
+                Err(_) => return debug!("connection cut: its client does not read"),
+            }
+        }
+    };
+    if let Err(error) = result {
+        debug!(%error, "connection ended");
+    }
+}

@@ -1,0 +1,434 @@
+//! The window as its clients see it, over real sockets.
+
+use std::io::{self, ErrorKind, Read, Write};
+use std::net::{SocketAddr, TcpStream};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use tokio::net::TcpListener;
+use tokio::sync::{mpsc, oneshot, watch};
+
+use super::server::{Limits, attend, run};
+use super::{canned, spawn};
+use crate::bridge::snapshot::Snapshot;
+use crate::config::settings::HttpSettings;
+use crate::daemon::window::{CoreHandle, CoreRequest};
+
+/// "Angles in degrees, distances in metres, ages in milliseconds, unknown is `null`."
+#[test]
+fn status_is_the_whole_snapshot() {
+    let window = Window::of(canned::snapshot());
+
+    let answer = window.get("/api/v1/status");
+
+    assert_eq!((answer.status, answer.header("content-type")), (200, Some("application/json")));
+    let expected = json!({
+        "version": "0.1.0",
+        "uptime_s": 3725.5,
+        "system_id": 1,
+        "links": [
+            {
+                "name": "autopilot", "role": "autopilot", "endpoint": "udpin:0.0.0.0:14540", "state": "up", "reason": null,
+                "rx_frames": 123_456, "tx_frames": 7890, "rx_bytes": 4_938_240, "tx_bytes": 315_600,
+                "crc_errors": 2, "resync_bytes": 17, "dropped_frames": 40, "dropped": {"duplicate": 3, "queue_full": 37},
+                "peers": [{"address": "127.0.0.1:14550", "components": ["1/1"], "age_ms": 3}],
+            },
+            {
+                "name": "gimbal", "role": "gimbal", "endpoint": "serial:/dev/serial0:115200",
+                "state": "down", "reason": "no such file or directory",
+                "rx_frames": 0, "tx_frames": 0, "rx_bytes": 0, "tx_bytes": 0,
+                "crc_errors": 0, "resync_bytes": 0, "dropped_frames": 0, "dropped": {}, "peers": [],
+            },
+        ],
+        "vehicle": {
+            "system_id": 1, "autopilot": "ardupilot", "alive": true,
+            "roll_deg": 2.5, "pitch_deg": -1.25, "heading_deg": 87.0, "attitude_age_ms": 12,
+            "latitude_deg": 47.397_742, "longitude_deg": 8.545_594, "altitude_amsl_m": 488.5, "position_age_ms": 95,
+            "yaw_rate_dps": 3.5,
+        },
+        "gimbals": [
+            {
+                "name": "camera", "family": "mavlink_v2", "manager_component_id": 191, "device_id": 154,
+                "device": "1/154", "state": "alive", "vendor": "Acme", "model": "Pixy", "firmware": "7.8.1",
+                "attitude": {
+                    "roll_deg": 0.25, "pitch_deg": -42.5, "yaw_vehicle_deg": 30.0, "yaw_earth_deg": 117.0, "age_ms": 18,
+                },
+                "setpoint": {
+                    "mode": "angle", "pitch_deg": -45.0, "yaw_deg": 120.0, "yaw_frame": "earth",
+                    "pitch_rate_dps": null, "yaw_rate_dps": null, "source": "255/190",
+                },
+                "primary": "255/190", "secondary": null,
+                "roi": {"latitude_deg": 47.4, "longitude_deg": 8.55, "altitude_amsl_m": 430.0},
+                "flags": ["yaw_lock", "roll_lock"], "failure_flags": ["motor_error"],
+                "rejected": {"1/100": {"not_in_control": 12}},
+            },
+            {
+                "name": "lamp", "family": "auto", "manager_component_id": 192, "device_id": null,
+                "device": null, "state": "searching", "vendor": null, "model": null, "firmware": null,
+                "attitude": {
+                    "roll_deg": null, "pitch_deg": null, "yaw_vehicle_deg": null, "yaw_earth_deg": null, "age_ms": null,
+                },
+                "setpoint": null, "primary": null, "secondary": null, "roi": null,
+                "flags": [], "failure_flags": [], "rejected": {},
+            },
+        ],
+        "conflicts": ["1/191 is also used by 10.0.0.7: set its component id to another value"],
+    });
+    assert_eq!(answer.json(), expected);
+}
+
+/// Protocol checklist 180: "When a value is NaN internally, HTTP JSON has null in its place and is parseable by a
+/// strict parser."
+#[test]
+fn what_is_no_number_is_null() {
+    let mut snapshot = canned::snapshot();
+    snapshot.vehicle.roll_deg = Some(f64::NAN);
+    snapshot.vehicle.altitude_amsl_m = Some(f64::INFINITY);
+    snapshot.gimbals[0].attitude.pitch_deg = Some(f64::NEG_INFINITY);
+    let window = Window::of(snapshot);
+
+    let status = window.get("/api/v1/status").json();
+
+    assert_eq!(status["vehicle"]["roll_deg"], Value::Null);
+    assert_eq!(status["vehicle"]["altitude_amsl_m"], Value::Null);
+    assert_eq!(status["gimbals"][0]["attitude"]["pitch_deg"], Value::Null);
+}
+
+/// "200 when every configured link is up and every configured gimbal is alive, else 503 with the reasons, as JSON
+/// {ready, reasons[]}."
+#[test]
+fn readiness_has_reasons() {
+    let answer = Window::of(canned::snapshot()).get("/readyz");
+    let reasons = ["link gimbal is down: no such file or directory", "gimbal lamp is searching"];
+    assert_eq!((answer.status, answer.json()), (503, json!({"ready": false, "reasons": reasons})));
+
+    let mut snapshot = canned::snapshot();
+    snapshot.links.truncate(1);
+    snapshot.gimbals.truncate(1);
+    let answer = Window::of(snapshot).get("/readyz");
+    assert_eq!((answer.status, answer.json()), (200, json!({"ready": true, "reasons": []})));
+}
+
+#[test]
+fn health_is_one_word() {
+    let answer = Window::of(Snapshot::default()).get("/healthz");
+    assert_eq!((answer.status, answer.body.as_str()), (200, "ok"));
+}
+
+/// "503 with a JSON error if the core does not answer" within 500 ms; `/healthz` gives it 1 s.
+#[test]
+fn a_core_that_hangs_is_told_in_time() {
+    let window = Window::open(None, Limits::default());
+    for (path, least, expected) in [
+        ("/api/v1/status", 500, json!({"error": "the core did not answer within 500 ms"})),
+        ("/readyz", 500, json!({"ready": false, "reasons": ["the core did not answer within 500 ms"]})),
+        ("/healthz", 1000, json!({"error": "the core did not answer within 1 s"})),
+    ] {
+        let start = now();
+        let answer = window.get(path);
+        assert_eq!((answer.status, answer.json()), (503, expected), "{path}");
+        assert!(start.elapsed() < Duration::from_millis(least + 3000), "{path} took {:?}", start.elapsed());
+    }
+}
+
+#[test]
+fn the_page_needs_no_core() {
+    let answer = Window::open(None, Limits::default()).get("/");
+    assert_eq!((answer.status, answer.header("content-type")), (200, Some("text/html; charset=utf-8")));
+    assert_eq!(answer.body, include_str!("page.html"));
+    let policy = answer.header("content-security-policy").expect("a policy");
+    assert!(policy.starts_with("default-src 'none'; style-src 'sha256-"), "{policy}");
+}
+
+/// "Unknown path 404 JSON, other methods 405."
+#[test]
+fn what_is_not_there_is_refused_as_json() {
+    let window = Window::of(Snapshot::default());
+    for path in ["/api/v1/nothing", "/index.html", "/../etc/passwd", "/%00", "/api/v1/status/"] {
+        let answer = window.get(path);
+        let error = json!({"error": "no such page; there are /, /api/v1/status, /healthz and /readyz"});
+        assert_eq!((answer.status, answer.json()), (404, error), "{path}");
+    }
+    for method in ["POST", "PUT", "DELETE", "OPTIONS", "PATCH", "TRACE"] {
+        let answer =
+            window.ask(&format!("{method} /api/v1/status HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"));
+        let error = json!({"error": "this window is read-only: use GET"});
+        assert_eq!((answer.status, answer.json(), answer.header("allow")), (405, error, Some("GET, HEAD")), "{method}");
+    }
+}
+
+#[test]
+fn every_answer_says_how_it_may_be_used() {
+    let window = Window::of(Snapshot::default());
+    for path in ["/", "/api/v1/status", "/healthz", "/readyz", "/nothing"] {
+        let answer = window.get(path);
+        assert_eq!(answer.header("cache-control"), Some("no-store"), "{path}");
+        assert_eq!(answer.header("x-content-type-options"), Some("nosniff"), "{path}");
+        assert_eq!(answer.header("referrer-policy"), Some("no-referrer"), "{path}");
+        assert_eq!(answer.header("cross-origin-resource-policy"), Some("same-origin"), "{path}");
+        assert_eq!(answer.header("access-control-allow-origin"), None, "{path}");
+        assert!(
+            answer.header("content-security-policy").is_some_and(|policy| policy.starts_with("default-src 'none'"))
+        );
+    }
+}
+
+/// A name made to point at loopback (DNS rebinding) gets neither the status nor the page.
+#[test]
+fn another_host_is_refused() {
+    let window = Window::of(canned::snapshot());
+    for path in ["/", "/api/v1/status"] {
+        let answer =
+            window.ask(&format!("GET {path} HTTP/1.1\r\nHost: evil.example:8080\r\nConnection: close\r\n\r\n"));
+        assert_eq!(answer.status, 403, "{path}");
+        assert!(answer.json()["error"].as_str().is_some_and(|error| error.contains("http://localhost")));
+    }
+}
+
+/// "At most 32 connections": whoever comes later waits until one is free.
+#[test]
+fn connections_beyond_the_limit_wait() {
+    let limits = Limits { connections: 2, header: FOREVER, lifetime: FOREVER, ..Limits::default() };
+    let window = Window::open(Some(Snapshot::default()), limits);
+    let first = window.connect();
+    let _second = window.connect();
+    let mut third = window.connect();
+    third.write_all(HEALTHZ).expect("the kernel takes the request");
+
+    third.set_read_timeout(Some(Duration::from_millis(300))).expect("a time-out");
+    let waiting = third.read(&mut [0]).expect_err("all places are taken");
+    assert_eq!(waiting.kind(), ErrorKind::WouldBlock);
+
+    drop(first);
+    third.set_read_timeout(Some(PATIENCE)).expect("a time-out");
+    assert_eq!(Answer::read(third).body, "ok");
+}
+
+/// A client that sends its headers by the byte, or nothing at all, loses its place.
+#[test]
+fn slow_headers_are_cut() {
+    let header = Duration::from_millis(200);
+    let window = Window::open(Some(Snapshot::default()), Limits { header, lifetime: FOREVER, ..Limits::default() });
+    for beginning in ["", "GET /healthz HT", "GET /healthz HTTP/1.1\r\nHost: localhost\r\n"] {
+        let start = now();
+        let mut client = window.connect();
+        client.write_all(beginning.as_bytes()).expect("the kernel takes it");
+        let mut answer = String::new();
+        client.read_to_string(&mut answer).expect("the connection is closed");
+        assert!(!answer.contains("200 OK"), "{beginning:?} got {answer:?}");
+        assert!(start.elapsed() >= header, "{beginning:?} was cut after {:?}", start.elapsed());
+    }
+    let mut idle = window.connect();
+    idle.write_all(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n").expect("the kernel takes it");
+    assert_eq!(Answer::read(idle).body, "ok", "answered, then closed although the client would stay");
+}
+
+/// Answers that nobody reads do not hold a place for ever.
+#[test]
+fn clients_that_do_not_read_are_cut() {
+    let short = Duration::from_millis(200);
+    let limits = Limits { lifetime: short, farewell: short, ..Limits::default() };
+    let window = Window::open(Some(Snapshot::default()), limits);
+    let mut client = window.connect();
+    client.set_write_timeout(Some(PATIENCE)).expect("a time-out");
+    let request = b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n".repeat(100);
+    let error = loop {
+        if let Err(error) = client.write_all(&request) {
+            break error;
+        }
+    };
+    assert!(matches!(error.kind(), ErrorKind::ConnectionReset | ErrorKind::BrokenPipe), "{error}");
+}
+
+#[test]
+fn headers_without_end_are_refused() {
+    let window = Window::of(Snapshot::default());
+    let mut client = window.connect();
+    let padding = format!("GET /healthz HTTP/1.1\r\nHost: localhost\r\nX-Padding: {}\r\n\r\n", "a".repeat(64 * 1024));
+    client.write_all(padding.as_bytes()).expect("the kernel takes it");
+    let mut status_line = [0; 12];
+    client.read_exact(&mut status_line).expect("an answer");
+    assert_eq!(&status_line, b"HTTP/1.1 431");
+}
+
+/// "The listening port taken or address not there yet: log a WARN with the remedy once and retry, never fatal."
+#[test]
+fn a_port_that_is_taken_is_tried_again() {
+    let journal = Journal::default();
+    let writer = journal.clone();
+    let subscriber = tracing_subscriber::fmt().with_ansi(false).with_writer(move || writer.clone()).finish();
+    let _guard = tracing::subscriber::set_default(subscriber);
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
+    runtime.block_on(async {
+        let occupant = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+        let address = occupant.local_addr().expect("its address");
+        let (core, _requests, _snapshots) = core();
+        let retry = Duration::from_millis(20);
+        tokio::spawn(run(address, core, Limits { retry, ..Limits::default() }));
+        let in_time = async {
+            while !journal.text().contains("trying again") {
+                tokio::time::sleep(retry).await;
+            }
+            tokio::time::sleep(3 * retry).await;
+            drop(occupant);
+            while !journal.text().contains("can be opened") {
+                tokio::time::sleep(retry).await;
+            }
+        };
+        tokio::time::timeout(PATIENCE, in_time).await.expect("it opens once the port is free");
+        TcpStream::connect(address).expect("it listens");
+    });
+    let text = journal.text();
+    let warnings: Vec<_> = text.lines().filter(|line| line.contains(" WARN ")).collect();
+    assert_eq!(warnings.len(), 1, "{text}");
+    assert!(warnings[0].contains("set another [http] listen"), "{text}");
+}
+
+#[test]
+fn the_thread_ends_with_the_core() {
+    let (core, requests, snapshots) = core();
+    let settings = HttpSettings { listen: LOOPBACK.parse().expect("an address"), token_file: None };
+    let thread = spawn(settings, core).expect("a thread");
+    assert!(!thread.is_finished());
+    drop((requests, snapshots));
+    let start = now();
+    while !thread.is_finished() {
+        assert!(start.elapsed() < PATIENCE, "the thread outlives the core");
+        std::thread::yield_now();
+    }
+    thread.join().expect("no panic");
+}
+
+const LOOPBACK: &str = "127.0.0.1:0";
+const HEALTHZ: &[u8] = b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
+/// Longer than any test takes.
+const FOREVER: Duration = Duration::from_secs(600);
+/// How long a test waits for what must happen.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+#[expect(clippy::disallowed_methods, reason = "time-outs of real sockets show in real time only")]
+fn now() -> Instant {
+    Instant::now()
+}
+
+fn core() -> (CoreHandle, mpsc::Receiver<CoreRequest>, watch::Sender<Arc<Snapshot>>) {
+    let (requests, received) = mpsc::channel(4);
+    let (published, snapshots) = watch::channel(Arc::default());
+    (CoreHandle { requests, snapshots }, received, published)
+}
+
+/// A window on a port of its own, and the core behind it.
+struct Window {
+    address: SocketAddr,
+    stop: Option<oneshot::Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Window {
+    fn of(snapshot: Snapshot) -> Self {
+        Self::open(Some(snapshot), Limits::default())
+    }
+
+    /// Without a snapshot the core hangs.
+    fn open(snapshot: Option<Snapshot>, limits: Limits) -> Self {
+        let (told, address) = std::sync::mpsc::channel();
+        let (stop, stopped) = oneshot::channel();
+        let thread = std::thread::spawn(move || {
+            let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
+            runtime.block_on(async {
+                let listener = TcpListener::bind(LOOPBACK).await.expect("a port");
+                let address = listener.local_addr().expect("its address");
+                told.send(address).expect("the test waits");
+                let (core, mut requests, published) = core();
+                let answer = async {
+                    while let (Some(CoreRequest::Refresh), Some(snapshot)) = (requests.recv().await, &snapshot) {
+                        published.send_replace(Arc::new(snapshot.clone()));
+                    }
+                    std::future::pending::<()>().await;
+                };
+                tokio::select! {
+                    () = attend(listener, address, core, limits) => {}
+                    () = answer => {}
+                    _ = stopped => {}
+                }
+            });
+        });
+        let address = address.recv_timeout(PATIENCE).expect("the window opens");
+        Self { address, stop: Some(stop), thread: Some(thread) }
+    }
+
+    fn connect(&self) -> TcpStream {
+        let stream = TcpStream::connect(self.address).expect("the window listens");
+        stream.set_read_timeout(Some(PATIENCE)).expect("a time-out");
+        stream
+    }
+
+    fn get(&self, path: &str) -> Answer {
+        self.ask(&format!("GET {path} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n\r\n", self.address))
+    }
+
+    fn ask(&self, request: &str) -> Answer {
+        let mut stream = self.connect();
+        stream.write_all(request.as_bytes()).expect("the window takes the request");
+        Answer::read(stream)
+    }
+}
+
+impl Drop for Window {
+    fn drop(&mut self) {
+        drop(self.stop.take());
+        if let Some(thread) = self.thread.take()
+            && thread.join().is_err()
+            && !std::thread::panicking()
+        {
+            panic!("the window's thread panicked");
+        }
+    }
+}
+
+struct Answer {
+    status: u16,
+    head: String,
+    body: String,
+}
+
+impl Answer {
+    fn read(mut stream: TcpStream) -> Self {
+        let mut text = String::new();
+        stream.read_to_string(&mut text).expect("a whole answer");
+        let (head, body) = text.split_once("\r\n\r\n").expect("headers, then a body");
+        let status = head.split(' ').nth(1).and_then(|status| status.parse().ok()).expect("a status");
+        Self { status, head: head.to_owned(), body: body.to_owned() }
+    }
+
+    fn header(&self, name: &str) -> Option<&str> {
+        let mut lines = self.head.lines().filter_map(|line| line.split_once(": "));
+        lines.find(|(key, _)| key.eq_ignore_ascii_case(name)).map(|(_, value)| value)
+    }
+
+    fn json(&self) -> Value {
+        assert_eq!(self.header("content-type"), Some("application/json"));
+        serde_json::from_str(&self.body).expect("strict JSON")
+    }
+}
+
+#[derive(Clone, Default)]
+struct Journal(Arc<Mutex<Vec<u8>>>);
+
+impl Journal {
+    fn text(&self) -> String {
+        String::from_utf8(self.0.lock().expect("not poisoned").clone()).expect("text")
+    }
+}
+
+impl Write for Journal {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.lock().expect("not poisoned").write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}

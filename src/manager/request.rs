@@ -1,0 +1,327 @@
+//! What others ask of a gimbal manager, read once: NaN, −1 and 0 as "not set" end here.
+
+use crate::geometry::{Angle, AngularRate, Attitude, EarthFrame, GimbalAngles};
+use crate::wire::dialect::{
+    COMMAND_INT_DATA, COMMAND_LONG_DATA, GIMBAL_MANAGER_SET_ATTITUDE_DATA, GIMBAL_MANAGER_SET_MANUAL_CONTROL_DATA,
+    GIMBAL_MANAGER_SET_PITCHYAW_DATA,
+};
+use crate::wire::ids::{CommandResult, GimbalFlags, command, message};
+use crate::wire::{Frame, MavId, Target};
+
+/// Something asked of a manager.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Request {
+    /// A demand on the gimbal by message: no answer is due.
+    Demand {
+        gimbal: u8,
+        demand: Demand,
+    },
+    Command(Command),
+}
+
+/// `COMMAND_LONG` or `COMMAND_INT`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Command {
+    pub number: u16,
+    pub target: Target,
+    /// Parameters 1 to 7 as sent; 5 and 6 of a `COMMAND_INT` are in `x` and `y`.
+    pub params: [f32; 7],
+    pub form: Form,
+}
+
+/// How the location parameters were sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    Long,
+    Int { frame: u8, x: i32, y: i32 },
+}
+
+/// Where one would have the gimbal look, or how it is to turn. `None` makes no demand on that axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Demand {
+    pub flags: GimbalFlags,
+    pub roll: AxisDemand,
+    /// Up is positive.
+    pub pitch: AxisDemand,
+    /// Right is positive; from the vehicle's nose or from North as `flags` say.
+    pub yaw: AxisDemand,
+    pub kind: DemandKind,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AxisDemand {
+    pub angle: Option<Angle>,
+    pub rate: Option<AngularRate>,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DemandKind {
+    /// Repeated by its sender; a rate that is not refreshed stops soon.
+    #[default]
+    Streamed,
+    /// Sent once.
+    Commanded,
+    /// −1 to 1 of what the gimbal can do (288); angles and rates are fractions until the manager scales them.
+    Manual,
+}
+
+/// Why a request is not done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Refusal {
+    pub result: CommandResult,
+    /// A word for the counters and the person looking.
+    pub reason: &'static str,
+}
+
+impl Refusal {
+    pub const fn denied(reason: &'static str) -> Self {
+        Self { result: CommandResult::Denied, reason }
+    }
+
+    pub const fn later(reason: &'static str) -> Self {
+        Self { result: CommandResult::TemporarilyRejected, reason }
+    }
+}
+
+/// Reads a message that a manager has to do with: `None` for any other, an error for one that is malformed.
+pub fn read_request(frame: &Frame<'_>) -> Option<Result<Request, Refusal>> {
+    let request = match frame.message_id() {
+        message::COMMAND_LONG => frame.decode().map(|message| Ok(Request::Command(command_long(frame, &message)))),
+        message::COMMAND_INT => frame.decode().map(|message| Ok(Request::Command(command_int(frame, &message)))),
+        message::GIMBAL_MANAGER_SET_ATTITUDE => frame.decode().map(|message| set_attitude(&message)),
+        message::GIMBAL_MANAGER_SET_PITCHYAW => frame.decode().map(|message| set_pitchyaw(&message)),
+        message::GIMBAL_MANAGER_SET_MANUAL_CONTROL => frame.decode().map(|message| set_manual_control(&message)),
+        _ => None,
+    };
+    request.map(|request| {
+        request.and_then(|request| match request {
+            Request::Demand { demand, .. } => check(&demand).map(|()| request),
+            Request::Command(_) => Ok(request),
+        })
+    })
+}
+
+fn command_long(frame: &Frame<'_>, message: &COMMAND_LONG_DATA) -> Command {
+    Command {
+        number: message.command,
+        target: frame.target(),
+        params: [
+            message.param1,
+            message.param2,
+            message.param3,
+            message.param4,
+            message.param5,
+            message.param6,
+            message.param7,
+        ],
+        form: Form::Long,
+    }
+}
+
+fn command_int(frame: &Frame<'_>, message: &COMMAND_INT_DATA) -> Command {
+    Command {
+        number: message.command,
+        target: frame.target(),
+        params: [message.param1, message.param2, message.param3, message.param4, f32::NAN, f32::NAN, message.z],
+        form: Form::Int { frame: message.frame, x: message.x, y: message.y },
+    }
+}
+
+/// `GIMBAL_MANAGER_SET_ATTITUDE` (282): a quaternion of four NaN states no angle.
+fn set_attitude(message: &GIMBAL_MANAGER_SET_ATTITUDE_DATA) -> Result<Request, Refusal> {
+    // The frame of the quaternion follows from the flags; the angles are the same numbers in either.
+    let attitude: Option<Attitude<EarthFrame>> =
+        Attitude::from_wxyz(message.q).map_err(|_| Refusal::denied("malformed_quaternion"))?;
+    let angles = attitude.map(Attitude::gimbal_angles);
+    let angle = |of: fn(GimbalAngles) -> Angle| angles.map(of);
+    Ok(Request::Demand {
+        gimbal: message.gimbal_device_id,
+        demand: Demand {
+            flags: GimbalFlags::from_bits_retain(message.flags as u16),
+            roll: AxisDemand { angle: angle(|angles| angles.roll), rate: rate(message.angular_velocity_x)? },
+            pitch: AxisDemand { angle: angle(|angles| angles.pitch), rate: rate(message.angular_velocity_y)? },
+            yaw: AxisDemand { angle: angle(|angles| angles.yaw), rate: rate(message.angular_velocity_z)? },
+            kind: DemandKind::Streamed,
+        },
+    })
+}
+
+/// `GIMBAL_MANAGER_SET_PITCHYAW` (287), in radians.
+fn set_pitchyaw(message: &GIMBAL_MANAGER_SET_PITCHYAW_DATA) -> Result<Request, Refusal> {
+    Ok(Request::Demand {
+        gimbal: message.gimbal_device_id,
+        demand: Demand {
+            flags: GimbalFlags::from_bits_retain(message.flags as u16),
+            roll: AxisDemand::default(),
+            pitch: AxisDemand { angle: angle(message.pitch)?, rate: rate(message.pitch_rate)? },
+            yaw: AxisDemand { angle: angle(message.yaw)?, rate: rate(message.yaw_rate)? },
+            kind: DemandKind::Streamed,
+        },
+    })
+}
+
+/// `GIMBAL_MANAGER_SET_MANUAL_CONTROL` (288), −1 to 1; beyond that is taken for the end.
+fn set_manual_control(message: &GIMBAL_MANAGER_SET_MANUAL_CONTROL_DATA) -> Result<Request, Refusal> {
+    let axis = |stick: f32, rate_stick: f32| -> Result<AxisDemand, Refusal> {
+        let rate = rate(rate_stick.clamp(-1.0, 1.0))?;
+        // A rate that is given wins over an angle on the same axis (A-42).
+        let angle = if rate.is_some() { None } else { angle(stick.clamp(-1.0, 1.0))? };
+        Ok(AxisDemand { angle, rate })
+    };
+    Ok(Request::Demand {
+        gimbal: message.gimbal_device_id,
+        demand: Demand {
+            flags: GimbalFlags::from_bits_retain(message.flags as u16),
+            roll: AxisDemand::default(),
+            pitch: axis(message.pitch, message.pitch_rate)?,
+            yaw: axis(message.yaw, message.yaw_rate)?,
+            kind: DemandKind::Manual,
+        },
+    })
+}
+
+fn angle(radians: f32) -> Result<Option<Angle>, Refusal> {
+    Ok(number(radians)?.map(Angle::from_radians))
+}
+
+fn rate(radians_per_second: f32) -> Result<Option<AngularRate>, Refusal> {
+    Ok(number(radians_per_second)?.map(AngularRate::from_radians_per_second))
+}
+
+/// NaN is no demand; an infinite number is a fault.
+fn number(value: f32) -> Result<Option<f64>, Refusal> {
+    match value {
+        value if value.is_nan() => Ok(None),
+        value if value.is_infinite() => Err(Refusal::denied("infinite_number")),
+        value => Ok(Some(f64::from(value))),
+    }
+}
+
+/// What no gimbal can do, whatever its capabilities.
+fn check(demand: &Demand) -> Result<(), Refusal> {
+    if demand.flags.contains(GimbalFlags::YAW_IN_VEHICLE_FRAME | GimbalFlags::YAW_IN_EARTH_FRAME) {
+        return Err(Refusal::denied("both_yaw_frames"));
+    }
+    Ok(())
+}
+
+impl Command {
+    /// Parameter `number`, 1 to 7, `None` when it is NaN.
+    pub fn param(&self, number: usize) -> Option<f32> {
+        Some(self.params[number - 1]).filter(|value| !value.is_nan())
+    }
+
+    /// Whether the command names exactly one component.
+    pub fn is_directed(&self) -> bool {
+        matches!(self.target, Target::Component(_))
+    }
+
+    /// A parameter that is a device id: NaN and 0 mean every gimbal of the component.
+    pub fn gimbal(&self, number: usize) -> Result<u8, Refusal> {
+        match self.param(number) {
+            None => Ok(0),
+            Some(id) if (0.0..=255.0).contains(&id) && id.fract() == 0.0 => Ok(id as u8),
+            Some(_) => Err(Refusal::denied("unknown_gimbal")),
+        }
+    }
+
+    /// `GIMBAL_MANAGER_FLAGS` in parameter 5, which a `COMMAND_INT` carries unscaled in `x`.
+    fn flags(&self) -> Result<GimbalFlags, Refusal> {
+        let bits = match self.form {
+            Form::Int { x: i32::MAX, .. } => 0,
+            Form::Int { x, .. } => u32::try_from(x).map_err(|_| Refusal::denied("malformed_flags"))?,
+            Form::Long => match self.param(5) {
+                None => 0,
+                Some(flags) if (0.0..=4_294_967_040.0).contains(&flags) && flags.fract() == 0.0 => flags as u32,
+                Some(_) => return Err(Refusal::denied("malformed_flags")),
+            },
+        };
+        Ok(GimbalFlags::from_bits_retain(bits as u16))
+    }
+
+    /// `DO_GIMBAL_MANAGER_PITCHYAW` (1000), in degrees.
+    pub fn pitchyaw(&self) -> Result<Demand, Refusal> {
+        debug_assert_eq!(self.number, command::DO_GIMBAL_MANAGER_PITCHYAW);
+        let degrees = |number| Ok(self.finite(number)?.map(f64::from));
+        let (pitch, yaw) = (degrees(1)?, degrees(2)?);
+        if pitch.is_some_and(|pitch| pitch.abs() > 180.0) || yaw.is_some_and(|yaw| yaw.abs() > 360.0) {
+            return Err(Refusal::denied("angle_out_of_range"));
+        }
+        let axis = |angle: Option<f64>, rate: Option<f64>| AxisDemand {
+            angle: angle.map(|angle| Angle::from_degrees(angle).wrapped()),
+            rate: rate.map(AngularRate::from_degrees_per_second),
+        };
+        let demand = Demand {
+            flags: self.flags()?,
+            roll: AxisDemand::default(),
+            pitch: axis(pitch, degrees(3)?),
+            yaw: axis(yaw, degrees(4)?),
+            kind: DemandKind::Commanded,
+        };
+        check(&demand)?;
+        Ok(demand)
+    }
+
+    /// A parameter that must not be infinite.
+    pub fn finite(&self, number: usize) -> Result<Option<f32>, Refusal> {
+        match self.param(number) {
+            Some(value) if value.is_infinite() => Err(Refusal::denied("infinite_number")),
+            value => Ok(value),
+        }
+    }
+}
+
+/// The four parameters of `DO_GIMBAL_MANAGER_CONFIGURE` (1001) that name who is to be in control.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Configure {
+    pub primary: Claim,
+    pub secondary: Claim,
+}
+
+/// What is asked for one of the two places.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Claim {
+    /// −1: leave unchanged.
+    Keep,
+    /// −2: the sender takes it.
+    Take,
+    /// −3: the sender gives it up, if it has it.
+    Release,
+    /// 0: nobody.
+    Clear,
+    Assign(MavId),
+}
+
+impl Configure {
+    /// Reads the parameters: "0: no one in control, -1: leave unchanged, -2: set itself in control, -3: remove
+    /// control if currently in control". System and component make one claim; half of one is refused.
+    pub fn read(command: &Command) -> Result<Self, Refusal> {
+        debug_assert_eq!(command.number, command::DO_GIMBAL_MANAGER_CONFIGURE);
+        Ok(Self { primary: claim(command, 1)?, secondary: claim(command, 3)? })
+    }
+}
+
+fn claim(command: &Command, first: usize) -> Result<Claim, Refusal> {
+    let id = |number: usize| -> Result<i16, Refusal> {
+        let value = command.params[number - 1];
+        if !value.is_finite() {
+            return Ok(-1);
+        }
+        // Fractions come from clients of 2020, whose command 1001 was "track point".
+        if (value - value.round()).abs() > 1e-3 {
+            return Err(Refusal::denied("not_an_id"));
+        }
+        if !(-3.0..=255.0).contains(&value.round()) {
+            return Err(Refusal::denied("not_an_id"));
+        }
+        Ok(value.round() as i16)
+    };
+    match (id(first)?, id(first + 1)?) {
+        (-1, -1) => Ok(Claim::Keep),
+        (-2, -2) => Ok(Claim::Take),
+        (-3, -3) => Ok(Claim::Release),
+        (0, 0..) | (0.., 0) => Ok(Claim::Clear),
+        (system @ 1.., component @ 1..) => Ok(Claim::Assign(MavId::new(system as u8, component as u8))),
+        _ => Err(Refusal::denied("half_a_pair")),
+    }
+}

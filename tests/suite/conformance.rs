@@ -1,0 +1,3 @@
+//! The protocol checklist, item by item; the number of an item is in the name of its test.
+
+mod codec;

@@ -1,0 +1,5 @@
+//! What more than one test needs.
+
+pub mod tlog;
+pub mod wire;
+pub mod world;

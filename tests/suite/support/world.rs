@@ -1,0 +1,330 @@
+//! The core between simulated or scripted peers, in simulated time.
+//!
+//! Every link end is a [`Place`]. What the core sends there is recorded, and handed to the peer that lives there if
+//! one does. Wires have no delay of their own; a line of transport serial is paced by the core.
+
+use std::time::Duration;
+
+use gimbald::bridge::settings::{LinkSettings, Role, Settings, SystemId, Transport};
+use gimbald::bridge::snapshot::Snapshot;
+use gimbald::bridge::{Bridge, ChannelId, Input, Output};
+use gimbald::gimbals::mavlink_v2::sim::{Device, DeviceSettings};
+use gimbald::sim::peer::Peer;
+use gimbald::sim::vehicle::{Vehicle, VehicleSettings};
+use gimbald::timestamp::Timestamp;
+use gimbald::wire::dialect::{HEARTBEAT_DATA, MavMessage, MessageData};
+use gimbald::wire::{DatagramFrames, Frame, FrameBuffer, MavId};
+
+/// The usual parties.
+pub const GCS: MavId = MavId::new(255, 190);
+pub const AUTOPILOT: MavId = MavId::new(1, 1);
+pub const GIMBAL: MavId = MavId::new(1, 154);
+pub const MANAGER: MavId = MavId::new(1, 191);
+
+/// The far end of one channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place(usize);
+
+/// One frame as it was received at a place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Arrival {
+    pub at: Timestamp,
+    pub bytes: Vec<u8>,
+}
+
+impl Arrival {
+    pub fn frame(&self) -> Frame<'_> {
+        let mut frames = DatagramFrames::new(&self.bytes);
+        let frame = frames.next_frame().expect("the core sends whole frames");
+        assert_eq!(frame.bytes(), self.bytes, "the core sends one frame at a time");
+        frame
+    }
+
+    pub fn id(&self) -> u32 {
+        self.frame().message_id()
+    }
+
+    pub fn source(&self) -> MavId {
+        self.frame().source()
+    }
+
+    pub fn decode<M: MessageData>(&self) -> M {
+        self.frame().decode().unwrap_or_else(|| panic!("{} expected, got {}", M::NAME, self.frame().name()))
+    }
+}
+
+struct End {
+    channel: ChannelId,
+    link: usize,
+    open: bool,
+    peer: Option<Box<dyn Peer>>,
+    arrivals: Vec<Arrival>,
+    sequence: u8,
+}
+
+/// The core and everything around it.
+pub struct World {
+    pub now: Timestamp,
+    pub bridge: Bridge,
+    ends: Vec<End>,
+    pub stored_system_ids: Vec<u8>,
+}
+
+impl World {
+    /// A core whose links are all up, with one open channel each, and nobody there. The places are in the order of
+    /// the links.
+    pub fn new(settings: Settings) -> (Self, Vec<Place>) {
+        let links = settings.links.len();
+        let bridge = Bridge::new(Timestamp::ZERO, settings);
+        let mut world = Self { now: Timestamp::ZERO, bridge, ends: Vec::new(), stored_system_ids: Vec::new() };
+        let mut places = Vec::new();
+        for link in 0..links {
+            world.input(Input::LinkUp { link });
+            places.push(world.open(link));
+        }
+        (world, places)
+    }
+
+    /// One more channel on a link, such as another UDP peer.
+    pub fn open(&mut self, link: usize) -> Place {
+        let channel = ChannelId::new(self.ends.len()).expect("a test has few channels");
+        self.ends.push(End { channel, link, open: true, peer: None, arrivals: Vec::new(), sequence: 0 });
+        let address = format!("test:{}", channel.index());
+        self.input(Input::ChannelOpened { channel, link, address: &address });
+        Place(self.ends.len() - 1)
+    }
+
+    /// Unplugs a place: its peer hears and says nothing more.
+    pub fn unplug(&mut self, place: Place) {
+        self.ends[place.0].open = false;
+        let (channel, link) = (self.ends[place.0].channel, self.ends[place.0].link);
+        self.input(Input::ChannelClosed { channel });
+        self.input(Input::LinkDown { link, reason: "unplugged" });
+    }
+
+    /// Plugs it in again.
+    pub fn plug_in(&mut self, place: Place) {
+        self.ends[place.0].open = true;
+        let (channel, link) = (self.ends[place.0].channel, self.ends[place.0].link);
+        self.input(Input::LinkUp { link });
+        self.input(Input::ChannelOpened { channel, link, address: "test" });
+    }
+
+    /// Lets a simulated peer live at a place.
+    pub fn install(&mut self, place: Place, mut peer: impl Peer + 'static) {
+        peer.handle_timeout(self.now);
+        self.ends[place.0].peer = Some(Box::new(peer));
+        self.settle();
+    }
+
+    /// Takes the peer away; it says nothing more.
+    pub fn remove_peer(&mut self, place: Place) {
+        self.ends[place.0].peer = None;
+    }
+
+    /// Bytes from a place, as one read.
+    pub fn send_bytes(&mut self, from: Place, bytes: &[u8]) {
+        let channel = self.ends[from.0].channel;
+        assert!(self.ends[from.0].open, "an unplugged place sends nothing");
+        self.input(Input::Received { channel, bytes });
+    }
+
+    /// A message from a component at a place, with the place's next sequence number; its bytes are returned.
+    pub fn send(&mut self, from: Place, source: MavId, message: &MavMessage) -> Vec<u8> {
+        let sequence = self.ends[from.0].sequence;
+        self.ends[from.0].sequence = sequence.wrapping_add(1);
+        let bytes = FrameBuffer::default().encode_any(source, sequence, message).bytes().to_vec();
+        self.send_bytes(from, &bytes);
+        bytes
+    }
+
+    pub fn input(&mut self, input: Input<'_>) {
+        self.bridge.handle_input(self.now, input);
+        self.settle();
+    }
+
+    /// Lets time pass, event by event.
+    pub fn run_for(&mut self, duration: Duration) {
+        let end = self.now + duration;
+        while let Some(next) = self.next_event().filter(|next| *next <= end) {
+            self.step_to(next);
+        }
+        self.now = end;
+    }
+
+    /// Goes to the next moment at which anything happens.
+    pub fn run_to_next_event(&mut self) {
+        let next = self.next_event().expect("something is always due");
+        self.step_to(next);
+    }
+
+    /// Runs as [`run_for`](Self::run_for) while a component at `from` repeats a message.
+    pub fn run_while_repeating(
+        &mut self,
+        duration: Duration,
+        every: Duration,
+        from: Place,
+        source: MavId,
+        message: &MavMessage,
+    ) {
+        let end = self.now + duration;
+        while self.now < end {
+            self.send(from, source, message);
+            let left = end - self.now;
+            self.run_for(every.min(left));
+        }
+    }
+
+    /// What has arrived at a place so far; it is forgotten.
+    pub fn take(&mut self, place: Place) -> Vec<Arrival> {
+        std::mem::take(&mut self.ends[place.0].arrivals)
+    }
+
+    /// The same, of one message only; the others are forgotten too.
+    pub fn take_messages<M: MessageData>(&mut self, place: Place) -> Vec<M> {
+        self.take(place).iter().filter(|arrival| arrival.id() == M::ID).map(Arrival::decode).collect()
+    }
+
+    /// Forgets what has arrived anywhere.
+    pub fn forget(&mut self) {
+        for end in &mut self.ends {
+            end.arrivals.clear();
+        }
+    }
+
+    pub fn snapshot(&self) -> Snapshot {
+        self.bridge.snapshot(self.now)
+    }
+
+    fn next_event(&self) -> Option<Timestamp> {
+        let peers = self.ends.iter().filter_map(|end| end.peer.as_ref()?.poll_timeout());
+        peers.chain(self.bridge.poll_timeout()).min().map(|at| at.max(self.now))
+    }
+
+    fn step_to(&mut self, at: Timestamp) {
+        self.now = at;
+        for end in &mut self.ends {
+            if let Some(peer) = &mut end.peer
+                && peer.poll_timeout().is_some_and(|due| due <= at)
+            {
+                peer.handle_timeout(at);
+            }
+        }
+        if self.bridge.poll_timeout().is_some_and(|due| due <= at) {
+            self.bridge.handle_timeout(at);
+        }
+        self.settle();
+    }
+
+    /// Carries everything that is on its way, until nothing is.
+    fn settle(&mut self) {
+        for _ in 0..10_000 {
+            let mut busy = self.carry_outputs();
+            let mut said: Vec<(ChannelId, Vec<u8>)> = Vec::new();
+            for end in &mut self.ends {
+                while let Some(bytes) = end.peer.as_mut().and_then(|peer| peer.poll_output()) {
+                    if end.open {
+                        said.push((end.channel, bytes));
+                    }
+                }
+            }
+            for (channel, bytes) in said {
+                busy = true;
+                self.bridge.handle_input(self.now, Input::Received { channel, bytes: &bytes });
+                self.carry_outputs();
+            }
+            if !busy {
+                return;
+            }
+        }
+        panic!("the peers never come to rest");
+    }
+
+    /// Drains the core; true when there was anything.
+    fn carry_outputs(&mut self) -> bool {
+        let mut any = false;
+        while let Some(output) = self.bridge.poll_output() {
+            any = true;
+            let (channels, bytes) = match output {
+                Output::Transmit { channels, bytes } => (channels, bytes.to_vec()),
+                Output::StoreSystemId(system) => {
+                    self.stored_system_ids.push(system);
+                    continue;
+                }
+            };
+            for channel in channels {
+                let end = self.ends.iter_mut().find(|end| end.channel == channel).expect("a known channel");
+                assert!(end.open, "sent on a closed channel");
+                if let Some(peer) = &mut end.peer {
+                    peer.handle_received(self.now, &bytes);
+                }
+                end.arrivals.push(Arrival { at: self.now, bytes: bytes.clone() });
+            }
+        }
+        any
+    }
+}
+
+/// A link for a test.
+pub fn link(name: &str, role: Role, transport: Transport) -> LinkSettings {
+    LinkSettings {
+        name: name.to_owned(),
+        role,
+        endpoint: format!("test:{name}"),
+        transport,
+        speaks_first: false,
+        max_rates: Default::default(),
+    }
+}
+
+/// Links of an autopilot, a gimbal and a ground station, in this order, all by datagrams; system id fixed to 1.
+pub fn three_links() -> Settings {
+    Settings {
+        system_id: SystemId::Fixed(1),
+        links: vec![
+            link("autopilot", Role::Autopilot, Transport::Datagrams),
+            link("gimbal", Role::Gimbal, Transport::Datagrams),
+            link("ground", Role::Ground, Transport::Datagrams),
+        ],
+        ..Settings::default()
+    }
+}
+
+/// The usual places.
+#[derive(Clone, Copy, Debug)]
+pub struct Places {
+    pub autopilot: Place,
+    pub gimbal: Place,
+    pub ground: Place,
+}
+
+impl World {
+    /// [`three_links`] with nobody there.
+    pub fn empty(settings: Settings) -> (Self, Places) {
+        let (world, places) = Self::new(settings);
+        (world, Places { autopilot: places[0], gimbal: places[1], ground: places[2] })
+    }
+
+    /// A simulated vehicle and gimbal; the gimbal is known, nothing that arrived on the way there is kept.
+    pub fn with_one_gimbal(settings: Settings) -> (Self, Places) {
+        let (mut world, places) = Self::empty(settings);
+        world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
+        world.install(places.gimbal, Device::new(Timestamp::ZERO, DeviceSettings::default()));
+        world.run_for(Duration::from_secs(3));
+        assert_eq!(world.snapshot().gimbals.first().map(|gimbal| gimbal.state.clone()), Some("alive".to_owned()));
+        world.forget();
+        (world, places)
+    }
+}
+
+/// A heartbeat of `kind` (`MAV_TYPE`) and `autopilot` (`MAV_AUTOPILOT`).
+pub fn heartbeat(kind: u8, autopilot: u8) -> MavMessage {
+    MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+        custom_mode: 0,
+        mavtype: kind,
+        autopilot,
+        base_mode: 0,
+        system_status: 4,
+        mavlink_version: 3,
+    })
+}
