@@ -295,6 +295,7 @@ impl Bridge {
             }
         }
         self.autopilot = None;
+        self.vehicle = Vehicle::new();
         if let Some(system) = system
             && let Some(component) = self.vehicles[usize::from(system)]
         {
