@@ -16,8 +16,10 @@ fn main() -> process::ExitCode {
     match cli.command {
         Command::Check(arguments) => commands::check::check(&arguments, &mut io::stdout(), &mut io::stderr()),
         Command::Run(arguments) => commands::run::run(&arguments, &mut io::stderr()),
+        Command::Demo(arguments) => commands::demo::demo(&arguments, &mut io::stdout(), &mut io::stderr()),
+        Command::Sim(command) => commands::sim::sim(&command, &mut io::stderr()),
         Command::Status(arguments) => commands::status::status(&arguments, &mut io::stderr()),
-        Command::Demo(_) | Command::Sim(_) | Command::Scan(_) => {
+        Command::Scan(_) => {
             // The exit code says it too; nobody is left to tell when the reader is gone.
             let _ = writeln!(io::stderr(), "gimbald: built without this command");
             ExitCode::Unavailable
