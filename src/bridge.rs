@@ -220,9 +220,7 @@ impl Bridge {
         }
         self.router.close_channel(channel);
         self.router.open_channel(channel);
-        for gimbal in self.roster.iter_mut() {
-            gimbal.manager.open_channel(now, channel);
-        }
+        self.roster.open_channel(now, channel);
         // A gimbal takes the system id of the first heartbeat it hears, so ours is the first there.
         if self.channels.role(channel) == Some(Role::Gimbal) && self.identity.system().is_some() {
             self.beat(now, channel.into());
@@ -232,9 +230,7 @@ impl Bridge {
     fn close_channel(&mut self, channel: ChannelId) {
         self.channels.close(channel);
         self.router.close_channel(channel);
-        for gimbal in self.roster.iter_mut() {
-            gimbal.manager.close_channel(channel);
-        }
+        self.roster.close_channel(channel);
     }
 
     fn handle_received(&mut self, now: Timestamp, channel: ChannelId, bytes: &[u8]) {
@@ -306,8 +302,9 @@ impl Bridge {
         {
             self.outbox.push_system_id(system);
         }
-        // Our first frame under a new id is a heartbeat, everywhere.
-        self.timers.set(Timer::Heartbeat, now);
+        // Our first frame under a new id is a heartbeat, everywhere, and before the frame that settled it goes on: a
+        // gimbal takes the system id of the first heartbeat it hears.
+        self.handle_heartbeat_timer(now);
     }
 
     fn take_autopilot(&mut self, now: Timestamp, autopilot: MavId) {

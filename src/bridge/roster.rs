@@ -5,6 +5,7 @@
 
 use super::LinkIndex;
 use super::settings::Settings;
+use crate::channel::{ChannelId, ChannelSet};
 use crate::gimbals::mavlink_v2::MavlinkV2Driver;
 use crate::gimbals::settings::GimbalSettings;
 use crate::gimbals::{DriverOutput, GimbalDriver};
@@ -67,6 +68,8 @@ pub enum GimbalOutput {
 pub struct Roster {
     gimbals: Vec<Gimbal>,
     rules: ControlSettings,
+    /// The channels that are open, for the manager of a gimbal that is found later.
+    open: ChannelSet,
 }
 
 /// No component id is left for the manager of another gimbal.
@@ -75,7 +78,7 @@ pub struct NoManagerLeft;
 
 impl Roster {
     pub fn new(settings: &Settings) -> Self {
-        let mut roster = Self { gimbals: Vec::new(), rules: settings.control.clone() };
+        let mut roster = Self { gimbals: Vec::new(), rules: settings.control.clone(), open: ChannelSet::EMPTY };
         let mut wanted: Vec<Option<u8>> = settings
             .gimbals
             .iter()
@@ -111,6 +114,21 @@ impl Roster {
         &mut self.gimbals[at]
     }
 
+    /// Every manager tells of its gimbal on `channel` from now on.
+    pub fn open_channel(&mut self, now: Timestamp, channel: ChannelId) {
+        self.open.insert(channel);
+        for gimbal in &mut self.gimbals {
+            gimbal.manager.open_channel(now, channel);
+        }
+    }
+
+    pub fn close_channel(&mut self, channel: ChannelId) {
+        self.open.remove(channel);
+        for gimbal in &mut self.gimbals {
+            gimbal.manager.close_channel(channel);
+        }
+    }
+
     /// The gimbal whose device that is.
     pub fn of_device(&mut self, device: MavId) -> Option<&mut Gimbal> {
         self.gimbals.iter_mut().find(|gimbal| gimbal.adopted == Some(device))
@@ -133,7 +151,11 @@ impl Roster {
             None => {
                 let component = self.free_manager(device).ok_or(NoManagerLeft)?;
                 let settings = GimbalSettings::found(format!("gimbal-{}", device.component));
-                self.gimbals.push(Gimbal::new(settings, &self.rules, component, false));
+                let mut gimbal = Gimbal::new(settings, &self.rules, component, false);
+                for channel in self.open {
+                    gimbal.manager.open_channel(now, channel);
+                }
+                self.gimbals.push(gimbal);
                 self.gimbals.len() - 1
             }
         };
