@@ -95,8 +95,8 @@ pub struct Bridge {
     vehicle: Vehicle,
     /// The autopilot of our system, once it was heard.
     autopilot: Option<MavId>,
-    /// Systems in which an autopilot was heard.
-    vehicles: Vec<bool>,
+    /// By system, the component that beats as its autopilot.
+    vehicles: Vec<Option<u8>>,
     roster: Roster,
     streams: AutopilotStreams,
     conflicts: Conflicts,
@@ -122,7 +122,7 @@ impl Bridge {
             router: Router::default(),
             vehicle: Vehicle::new(),
             autopilot: None,
-            vehicles: vec![false; 256],
+            vehicles: vec![None; 256],
             roster: Roster::new(&settings),
             streams: AutopilotStreams::default(),
             conflicts: Conflicts::default(),
@@ -290,7 +290,13 @@ impl Bridge {
                 gimbal.manager.forget_system(now, before, around);
             }
         }
-        self.autopilot = self.autopilot.filter(|autopilot| Some(autopilot.system) == system);
+        self.autopilot = None;
+        self.vehicle = Vehicle::new();
+        if let Some(system) = system
+            && let Some(component) = self.vehicles[usize::from(system)]
+        {
+            self.take_autopilot(now, MavId::new(system, component));
+        }
         if let Some(system) = system
             && !self.identity.is_bootstrap()
         {
@@ -299,6 +305,12 @@ impl Bridge {
         // Our first frame under a new id is a heartbeat, everywhere, and before the frame that settled it goes on: a
         // gimbal takes the system id of the first heartbeat it hears.
         self.handle_heartbeat_timer(now);
+    }
+
+    fn take_autopilot(&mut self, now: Timestamp, autopilot: MavId) {
+        tracing::info!(%autopilot, "autopilot found");
+        self.autopilot = Some(autopilot);
+        self.streams.handle_autopilot_found(now);
     }
 
     fn handle_heartbeat_timer(&mut self, now: Timestamp) {

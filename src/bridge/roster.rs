@@ -20,6 +20,8 @@ use crate::wire::ids::component;
 pub struct Gimbal {
     pub manager: GimbalManager,
     pub driver: Box<dyn GimbalDriver>,
+    /// The component that the driver talks to, from the first sign of it on.
+    pub adopted: Option<MavId>,
     /// The manager's component id.
     pub component: u8,
     /// It has an entry in the configuration, and is missed when it is not there.
@@ -31,6 +33,7 @@ impl Gimbal {
         Self {
             manager: GimbalManager::new(settings, rules.clone()),
             driver: Box::new(MavlinkV2Driver::new()),
+            adopted: None,
             component,
             configured,
         }
@@ -128,12 +131,12 @@ impl Roster {
 
     /// The gimbal whose device that is.
     pub fn of_device(&mut self, device: MavId) -> Option<&mut Gimbal> {
-        self.gimbals.iter_mut().find(|gimbal| gimbal.manager.device() == Some(device))
+        self.gimbals.iter_mut().find(|gimbal| gimbal.adopted == Some(device))
     }
 
     /// Whether `id` is a managed device.
     pub fn is_device(&self, id: MavId) -> bool {
-        self.gimbals.iter().any(|gimbal| gimbal.manager.device() == Some(id))
+        self.gimbals.iter().any(|gimbal| gimbal.adopted == Some(id))
     }
 
     /// Whether `component` is one of our managers.
@@ -157,13 +160,14 @@ impl Roster {
             }
         };
         self.gimbals[at].driver.adopt(now, device);
+        self.gimbals[at].adopted = Some(device);
         Ok(&mut self.gimbals[at])
     }
 
     fn place_for(&self, device: MavId, link: LinkIndex) -> Option<usize> {
         let fits = |gimbal: &Gimbal| {
             let settings = gimbal.manager.settings();
-            let free = gimbal.manager.device().is_none()
+            let free = gimbal.adopted.is_none()
                 || (gimbal.manager.state() == DeviceState::Lost && settings.component_id == Some(device.component));
             free && settings.link.is_none_or(|wanted| wanted == link)
         };
