@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use gimbald::wire::dialect::{
-    COMMAND_ACK_DATA, COMMAND_LONG_DATA, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA, MavMessage,
+    COMMAND_ACK_DATA, COMMAND_LONG_DATA, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA,
+    MavMessage,
 };
 
 use crate::support::world::{GCS, MANAGER, World, heartbeat, three_links};
