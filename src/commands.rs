@@ -1,5 +1,8 @@
 //! One module for each command: what it does with its arguments, and how it ends.
 
 pub mod check;
+pub mod demo;
 pub mod run;
+pub mod scan;
+pub mod sim;
 pub mod status;

@@ -2,10 +2,10 @@
 //! through.
 
 mod channels;
-mod clock;
+pub mod clock;
 mod event_loop;
 pub mod logging;
-mod shutdown;
+pub mod shutdown;
 pub mod supervisor;
 mod system_id_file;
 mod systemd;

@@ -1,9 +1,10 @@
 //! The checked configuration, as the daemon takes it.
 
+use std::collections::BTreeMap;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 
-use crate::bridge::settings::{LinkSettings, Settings, Transport};
+use crate::bridge::settings::{LinkSettings, Role, Settings, Transport};
 use crate::endpoint::Endpoint;
 use crate::gimbals::settings::GimbalSettings;
 use crate::manager::settings::ControlSettings;
@@ -63,22 +64,23 @@ fn required<T>(located: Option<Located<T>>) -> T {
 
 fn link(link: Link) -> (LinkSettings, Endpoint) {
     let endpoint = required(link.endpoint);
-    let (transport, speaks_first) = match endpoint {
+    let settings = LinkSettings {
+        max_rates: link.max_rates.into_iter().collect(),
+        ..link_on(required(link.name), required(link.role), &endpoint)
+    };
+    (settings, endpoint)
+}
+
+/// What the core must know of a link on `endpoint`, without limits to its rates.
+pub fn link_on(name: String, role: Role, endpoint: &Endpoint) -> LinkSettings {
+    let (transport, speaks_first) = match *endpoint {
         Endpoint::Serial { baud, .. } => (Transport::Serial { baud }, false),
         Endpoint::UdpIn(_) => (Transport::Datagrams, false),
         Endpoint::UdpOut(_) | Endpoint::UdpBroadcast(_) => (Transport::Datagrams, true),
         Endpoint::TcpIn(_) => (Transport::Stream, false),
         Endpoint::TcpOut(_) => (Transport::Stream, true),
     };
-    let settings = LinkSettings {
-        name: required(link.name),
-        role: required(link.role),
-        endpoint: endpoint.to_string(),
-        transport,
-        speaks_first,
-        max_rates: link.max_rates.into_iter().collect(),
-    };
-    (settings, endpoint)
+    LinkSettings { name, role, endpoint: endpoint.to_string(), transport, speaks_first, max_rates: BTreeMap::new() }
 }
 
 fn gimbal(gimbal: Gimbal, links: &[LinkSettings]) -> GimbalSettings {

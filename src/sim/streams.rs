@@ -34,8 +34,8 @@ impl Streams {
     pub fn set_interval(&mut self, now: Timestamp, message_id: u32, interval_us: f64) -> bool {
         let Some(stream) = self.0.iter_mut().find(|stream| stream.message_id == message_id) else { return false };
         stream.interval = match interval_us {
-            us if us == 0.0 => stream.usual,
-            us if us == -1.0 => None,
+            0.0 => stream.usual,
+            -1.0 => None,
             us if us > 0.0 => Some(Duration::from_micros(us as u64).max(SHORTEST)),
             _ => return false,
         };

@@ -12,6 +12,7 @@ mod discovery;
 mod manager;
 mod pointing;
 mod status;
+mod tester;
 
 const AUTOPILOT: MavId = MavId::new(1, 1);
 const MANAGER: MavId = MavId::new(1, 191);

@@ -36,9 +36,12 @@ impl Peer for Beacon {
     fn handle_timeout(&mut self, now: Timestamp) {
         if self.next <= now {
             self.next = now + Duration::from_millis(10);
-            let mut status = GIMBAL_DEVICE_ATTITUDE_STATUS_DATA::default();
-            status.time_boot_ms = Timestamp::from_micros(now.since(self.boot).as_micros() as u64).boot_ms();
-            status.q = [1.0, 0.0, 0.0, 0.0];
+            let time_boot_ms = (Timestamp::ZERO + now.since(self.boot)).boot_ms();
+            let status = GIMBAL_DEVICE_ATTITUDE_STATUS_DATA {
+                time_boot_ms,
+                q: [1.0, 0.0, 0.0, 0.0],
+                ..GIMBAL_DEVICE_ATTITUDE_STATUS_DATA::default()
+            };
             self.send(&status);
         }
     }

@@ -48,7 +48,7 @@ fn information_says_what_the_device_is() {
     assert_eq!(information.firmware_version, 0x0000_0001);
     assert_eq!((information.gimbal_device_id, information.cap_flags2), (0, 0));
     assert_eq!(information.cap_flags, 8119);
-    assert_eq!((information.pitch_min, information.pitch_max), (-1.570_796_4, 0.785_398_2));
+    assert_eq!((information.pitch_min, information.pitch_max), (-90_f32.to_radians(), 45_f32.to_radians()));
     assert_eq!((information.yaw_min, information.yaw_max), (f32::NEG_INFINITY, f32::INFINITY));
 
     let mut newer = Bench::new(|settings| settings.has_cap_flags2 = true);

@@ -1,0 +1,177 @@
+//! `gimbald demo`: the whole system without hardware.
+//!
+//! Vehicle and gimbal are peers of their own on real links, a UDP socket and a pseudo-terminal; between them runs the
+//! daemon as it always does.
+
+use std::io::{self, Write};
+use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
+use std::thread;
+use std::time::Duration;
+
+use nix::sys::signal::{Signal, raise};
+use tokio::sync::oneshot;
+
+use crate::bridge::settings::{Role, Settings};
+use crate::cli::{DemoArgs, SimulatedFamily};
+use crate::config::settings::{DaemonSettings, HttpSettings, link_on};
+use crate::daemon::supervisor;
+use crate::endpoint::Endpoint;
+use crate::exit_code::ExitCode;
+use crate::gimbals::mavlink_v2::sim::{Device, DeviceSettings};
+use crate::links::{self, Link};
+use crate::sim::host::{self, HostError};
+use crate::sim::peer::Peer;
+use crate::sim::pty::Pty;
+use crate::sim::vehicle::{Vehicle, VehicleSettings};
+use crate::timestamp::Timestamp;
+
+/// Where a second client may connect.
+const CLIENT: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 14551);
+
+const GIMBAL_BAUD: u32 = 115_200;
+
+/// Why there is no demo.
+#[derive(Debug, thiserror::Error)]
+enum DemoError {
+    #[error("no pseudo-terminal for the gimbal")]
+    Pty(#[source] io::Error),
+    #[error("no UDP port for the vehicle")]
+    Port(#[source] io::Error),
+    #[error("no thread for a simulated peer")]
+    Thread(#[source] io::Error),
+    #[error(transparent)]
+    Daemon(#[from] supervisor::RunError),
+}
+
+/// Runs until SIGTERM or SIGINT, or until the duration that was asked for is over.
+pub fn demo(arguments: &DemoArgs, output: &mut impl Write, errors: &mut impl Write) -> ExitCode {
+    match run(arguments, output) {
+        Ok(()) => ExitCode::Ok,
+        Err(error) => {
+            let cause = std::error::Error::source(&error).map(|cause| format!(": {cause}")).unwrap_or_default();
+            // The exit code says it too; nobody is left to tell when the reader is gone.
+            let _ = writeln!(errors, "gimbald demo: {error}{cause}");
+            ExitCode::Unavailable
+        }
+    }
+}
+
+fn run(arguments: &DemoArgs, output: &mut impl Write) -> Result<(), DemoError> {
+    let cable = Pty::open().map_err(DemoError::Pty)?;
+    let path = cable.path().map_err(DemoError::Pty)?.to_string_lossy().into_owned();
+    let autopilot = free_port().map_err(DemoError::Port)?;
+    let settings = daemon_settings(arguments, Endpoint::Serial { path, baud: GIMBAL_BAUD }, autopilot);
+
+    let vehicle = Simulation::start("vehicle", Vehicle::new(Timestamp::ZERO, VehicleSettings::default()), move || {
+        Ok(links::link(&Endpoint::UdpOut(autopilot)))
+    })?;
+    let gimbal = match arguments.family {
+        SimulatedFamily::MavlinkV2 => {
+            let device = Device::new(Timestamp::ZERO, DeviceSettings::default());
+            Simulation::start("gimbal", device, move || Ok(Box::new(cable.into_link()?)))?
+        }
+    };
+    if let Some(seconds) = arguments.duration {
+        end_after(Duration::from_secs(u64::from(seconds))).map_err(DemoError::Thread)?;
+    }
+    // The demo goes on when nobody reads what it says.
+    let _ = write!(output, "{}", instructions(arguments, &settings)).and_then(|()| output.flush());
+
+    let result = supervisor::run(settings);
+    vehicle.end();
+    gimbal.end();
+    Ok(result?)
+}
+
+fn daemon_settings(arguments: &DemoArgs, gimbal: Endpoint, autopilot: SocketAddr) -> DaemonSettings {
+    let all = [
+        ("gimbal", Role::Gimbal, gimbal),
+        ("autopilot", Role::Autopilot, Endpoint::UdpIn(autopilot)),
+        ("ground", Role::Ground, arguments.ground.clone()),
+        ("client", Role::Ground, Endpoint::UdpIn(CLIENT)),
+    ];
+    let links = all.iter().map(|(name, role, endpoint)| link_on((*name).to_owned(), *role, endpoint)).collect();
+    DaemonSettings {
+        core: Settings { links, ..Settings::default() },
+        endpoints: all.into_iter().map(|(_, _, endpoint)| endpoint).collect(),
+        http: Some(HttpSettings { listen: arguments.http, token_file: None }),
+        // A simulated vehicle's id is not worth keeping.
+        state_directory: None,
+    }
+}
+
+fn instructions(arguments: &DemoArgs, settings: &DaemonSettings) -> String {
+    let listed: Vec<_> =
+        settings.core.links.iter().map(|link| format!("    {:<10} {}", link.name, link.endpoint)).collect();
+    format!(
+        "\
+gimbald demo: a simulated vehicle and gimbal, and the daemon between them
+
+  Page             http://{}
+  QGroundControl   start it; the vehicle appears by itself ({})
+  MAVSDK           connection udpout://{CLIENT}
+  MAVProxy         mavproxy.py --master=udpout:{CLIENT}, then: module load camera; camera set manager_component 191
+
+  Links
+{}
+
+Ctrl-C ends it.
+",
+        arguments.http,
+        arguments.ground,
+        listed.join("\n"),
+    )
+}
+
+/// A UDP port on the loopback that nobody has at the moment.
+fn free_port() -> io::Result<SocketAddr> {
+    UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?.local_addr()
+}
+
+/// Ends the process, with a goodbye, when the time is over.
+fn end_after(duration: Duration) -> io::Result<()> {
+    thread::Builder::new().name("duration".to_owned()).spawn(move || {
+        thread::sleep(duration);
+        if let Err(error) = raise(Signal::SIGTERM) {
+            tracing::error!(%error, "the time is over, but the demo could not be ended");
+        }
+    })?;
+    Ok(())
+}
+
+/// A simulated peer on a thread of its own.
+struct Simulation {
+    name: &'static str,
+    stop: oneshot::Sender<()>,
+    thread: thread::JoinHandle<Result<(), HostError>>,
+}
+
+impl Simulation {
+    fn start<P: Peer + Send + 'static>(
+        name: &'static str,
+        peer: P,
+        open: impl FnOnce() -> io::Result<Box<dyn Link>> + Send + 'static,
+    ) -> Result<Self, DemoError> {
+        let (stop, stopped) = oneshot::channel();
+        let stopped = async {
+            // Whether it was told or the sender is gone, it is over.
+            let _ = stopped.await;
+            Ok(())
+        };
+        let thread = thread::Builder::new()
+            .name(name.to_owned())
+            .spawn(move || host::run(peer, open, stopped))
+            .map_err(DemoError::Thread)?;
+        Ok(Self { name, stop, thread })
+    }
+
+    fn end(self) {
+        // It may have ended by itself.
+        let _ = self.stop.send(());
+        match self.thread.join() {
+            Ok(Ok(())) => {}
+            Ok(Err(error)) => tracing::error!(peer = self.name, %error, "a simulated peer failed"),
+            Err(_) => tracing::error!(peer = self.name, "a simulated peer panicked"),
+        }
+    }
+}
