@@ -38,7 +38,10 @@ def body(steps):
     def shows_gimbal():
         def gimbal():
             demo.check()
-            gimbals = json.loads(get(f"http://{page}/api/v1/status")[1])["gimbals"]
+            try:
+                gimbals = json.loads(get(f"http://{page}/api/v1/status")[1])["gimbals"]
+            except OSError:
+                return None  # the page is not up yet
             return gimbals and gimbals[0]["state"] == "alive" and gimbals[0]
 
         found = wait_for("a gimbal that is alive", gimbal, 10)
