@@ -3,7 +3,6 @@
 use std::future::poll_fn;
 use std::io;
 use std::sync::Arc;
-use std::time::Duration;
 
 use tokio::sync::{mpsc, watch};
 
@@ -19,8 +18,6 @@ use crate::{http, links};
 
 /// Requests that may wait; whoever asks for more waits.
 const REQUESTS: usize = 16;
-/// How long a file that is being written may hold up the end.
-const FILE_PATIENCE: Duration = Duration::from_millis(200);
 
 /// Why the daemon could not start, or not go on.
 #[derive(Debug, thiserror::Error)]
@@ -41,12 +38,10 @@ pub enum RunError {
 /// the core.
 pub fn run(settings: DaemonSettings) -> Result<(), RunError> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_io().build().map_err(RunError::Runtime)?;
-    let result = runtime.block_on(async {
+    runtime.block_on(async {
         let mut event_loop = assemble(settings)?;
         poll_fn(|cx| event_loop.poll(cx)).await.map_err(RunError::Timer)
-    });
-    runtime.shutdown_timeout(FILE_PATIENCE);
-    result
+    })
 }
 
 fn assemble(settings: DaemonSettings) -> Result<EventLoop, RunError> {

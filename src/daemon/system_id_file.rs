@@ -3,19 +3,25 @@
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread;
 
+/// Ids that may wait for the storage; an autopilot changes its id once in a lifetime.
+const WAITING: usize = 4;
 const NAME: &str = "system-id";
 const NEW_NAME: &str = "system-id.new";
 
 /// A file of one number in the state directory; nothing is kept without that directory.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct SystemIdFile {
     directory: Option<PathBuf>,
+    /// Leads to the thread that writes, once there was something to write.
+    writer: Option<SyncSender<u8>>,
 }
 
 impl SystemIdFile {
     pub fn new(directory: Option<PathBuf>) -> Self {
-        Self { directory }
+        Self { directory, writer: None }
     }
 
     /// What an earlier run stored, if it can be used.
@@ -37,13 +43,31 @@ impl SystemIdFile {
     }
 
     /// Replaces what was stored, on a thread of its own, because storage can be slow.
-    pub fn store(&self, id: u8) {
-        if let Some(directory) = self.directory.clone() {
-            tokio::task::spawn_blocking(move || {
-                if let Err(error) = replace(&directory, id) {
-                    tracing::error!(directory = %directory.display(), %error, "the system id cannot be stored");
-                }
-            });
+    pub fn store(&mut self, id: u8) {
+        let Some(directory) = &self.directory else { return };
+        let stored = match &self.writer {
+            Some(writer) => writer.try_send(id).map_err(|error| error.to_string()),
+            None => start_writer(directory.clone(), id)
+                .map(|writer| self.writer = Some(writer))
+                .map_err(|error| error.to_string()),
+        };
+        if let Err(reason) = stored {
+            tracing::error!(id, reason, "the system id cannot be stored");
+        }
+    }
+}
+
+/// Starts the thread that writes, with `first` to begin with.
+fn start_writer(directory: PathBuf, first: u8) -> io::Result<SyncSender<u8>> {
+    let (writer, ids) = sync_channel(WAITING);
+    thread::Builder::new().name("system-id".to_owned()).spawn(move || write_all(&directory, first, &ids))?;
+    Ok(writer)
+}
+
+fn write_all(directory: &Path, first: u8, ids: &Receiver<u8>) {
+    for id in std::iter::once(first).chain(ids) {
+        if let Err(error) = replace(directory, id) {
+            tracing::error!(directory = %directory.display(), %error, "the system id cannot be stored");
         }
     }
 }
@@ -71,8 +95,10 @@ mod tests {
         let file = SystemIdFile::new(Some(directory.path().to_owned()));
         assert_eq!(file.read(), None);
 
-        replace(directory.path(), 7).expect("it can be stored");
-        replace(directory.path(), 42).expect("it can be replaced");
+        let (more, ids) = sync_channel(WAITING);
+        more.send(42).expect("there is room");
+        drop(more);
+        write_all(directory.path(), 7, &ids);
 
         assert_eq!(file.read(), Some(42));
         let names: Vec<_> = fs::read_dir(directory.path()).expect("it is there").flatten().collect();

@@ -12,7 +12,7 @@ use tokio::net::TcpStream;
 
 use super::Progress;
 use super::frame_queue::FrameQueue;
-use super::inbox::{Inbox, PeerIndex};
+use super::inbox::{self, Inbox, PeerIndex};
 use super::send_failures::SendFailures;
 use crate::timestamp::Timestamp;
 
@@ -22,12 +22,14 @@ const OUTPUT_LIMIT: usize = 64 * 1024;
 const KERNEL_BUFFER: usize = 64 * 1024;
 /// A peer that takes nothing for so long is closed.
 const STALL_LIMIT: Duration = Duration::from_secs(10);
-/// Reads of one connection in one batch.
-const READS: usize = 4;
+/// Reads of one connection in one batch: as many as leave the same for all others.
+const READS: usize = inbox::READS / inbox::PEERS;
 
 pub struct Connection {
     stream: TcpStream,
     output: FrameQueue,
+    /// Whether room for more output will wake the event loop.
+    waits_for_room: bool,
     failure: Option<io::Error>,
 }
 
@@ -43,7 +45,7 @@ impl Connection {
             .with_interval(Duration::from_secs(5))
             .with_retries(3);
         socket.set_tcp_keepalive(&probes)?;
-        Ok(Self { stream, output: FrameQueue::new(OUTPUT_LIMIT), failure: None })
+        Ok(Self { stream, output: FrameQueue::new(OUTPUT_LIMIT), waits_for_room: false, failure: None })
     }
 
     pub fn address(&self) -> io::Result<SocketAddr> {
@@ -81,7 +83,10 @@ impl Connection {
     fn poll_output(&mut self, now: Timestamp, cx: &mut Context<'_>) {
         while !self.output.is_empty() && self.failure.is_none() {
             match self.stream.poll_write_ready(cx) {
-                Poll::Pending => break,
+                Poll::Pending => {
+                    self.waits_for_room = true;
+                    break;
+                }
                 Poll::Ready(Ok(())) => self.flush(now),
                 Poll::Ready(Err(error)) => self.failure = Some(error),
             }
@@ -92,10 +97,11 @@ impl Connection {
     }
 
     pub fn poll_timeout(&self) -> Option<Timestamp> {
-        match &self.failure {
-            Some(_) => Some(Timestamp::ZERO),
-            None => self.output.stalled_since().map(|since| since + STALL_LIMIT),
+        let stalled_since = self.output.stalled_since();
+        if self.failure.is_some() || stalled_since.is_some() && !self.waits_for_room {
+            return Some(Timestamp::ZERO);
         }
+        stalled_since.map(|since| since + STALL_LIMIT)
     }
 
     pub fn send(&mut self, peer: PeerIndex, frame: &[u8], failures: &mut SendFailures) {
@@ -105,6 +111,7 @@ impl Connection {
     }
 
     pub fn flush(&mut self, now: Timestamp) {
+        self.waits_for_room = false;
         if !self.output.is_empty()
             && let Err(error) = self.output.write(now, |bytes| self.stream.try_write(bytes))
         {

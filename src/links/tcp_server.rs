@@ -3,6 +3,7 @@
 use std::io;
 use std::net::SocketAddr;
 use std::task::{Context, Poll};
+use std::time::Duration;
 
 use socket2::{Domain, Protocol, Socket, Type};
 use tokio::net::TcpListener;
@@ -18,6 +19,8 @@ use crate::timestamp::Timestamp;
 const BACKLOG: i32 = 16;
 /// Connections accepted in one poll.
 const ACCEPTS: usize = 4;
+/// How long accepting rests after it failed.
+const ACCEPT_RETRY: Duration = Duration::from_secs(2);
 
 pub struct TcpServer {
     address: SocketAddr,
@@ -26,6 +29,8 @@ pub struct TcpServer {
     backoff: Backoff,
     failures: SendFailures,
     refusal_told: bool,
+    /// Accepting failed; it is tried again then.
+    accept_at: Option<Timestamp>,
 }
 
 enum State {
@@ -42,6 +47,7 @@ impl TcpServer {
             backoff: Backoff::for_sockets(),
             failures: SendFailures::default(),
             refusal_told: false,
+            accept_at: None,
         }
     }
 
@@ -52,17 +58,18 @@ impl TcpServer {
                 self.backoff.reset();
                 inbox.up();
             }
-            Err(error) => self.close(now, &error, inbox),
+            Err(error) => {
+                self.state = State::Closed { retry_at: self.backoff.failed(now) };
+                inbox.down(format!("cannot listen on {}: {}", self.address, cause(&error)));
+            }
         }
     }
 
-    fn close(&mut self, now: Timestamp, error: &io::Error, inbox: &mut Inbox) {
-        self.state = State::Closed { retry_at: self.backoff.failed(now) };
-        self.connections = Default::default();
-        inbox.down(format!("cannot listen on {}: {}", self.address, cause(error)));
-    }
-
     fn accept(&mut self, now: Timestamp, cx: &mut Context<'_>, inbox: &mut Inbox) -> Progress {
+        if self.accept_at.is_some_and(|at| now < at) {
+            return Progress::Idle;
+        }
+        self.accept_at = None;
         for _ in 0..ACCEPTS {
             let State::Open(listener) = &self.state else { return Progress::Idle };
             match listener.poll_accept(cx) {
@@ -73,7 +80,9 @@ impl TcpServer {
                 },
                 Poll::Ready(Err(error)) if error.kind() == io::ErrorKind::ConnectionAborted => {}
                 Poll::Ready(Err(error)) => {
-                    self.close(now, &error, inbox);
+                    // This process or the machine has no descriptor left; the connections there are go on.
+                    tracing::warn!(address = %self.address, reason = cause(&error), "a connection cannot be accepted");
+                    self.accept_at = Some(now + ACCEPT_RETRY);
                     return Progress::Idle;
                 }
             }
@@ -138,7 +147,10 @@ impl Link for TcpServer {
     fn poll_timeout(&self) -> Option<Timestamp> {
         match &self.state {
             State::Closed { retry_at } => Some(*retry_at),
-            State::Open(_) => self.connections.iter().flatten().filter_map(Connection::poll_timeout).min(),
+            State::Open(_) => {
+                let connections = self.connections.iter().flatten().filter_map(Connection::poll_timeout);
+                connections.chain(self.accept_at).min()
+            }
         }
     }
 
@@ -169,7 +181,6 @@ impl Link for TcpServer {
 mod tests {
     use std::io::{Read, Write};
     use std::net::TcpStream;
-    use std::time::Duration;
 
     use super::super::harness::{PATIENCE, Rig, Seen, noise, read_available, write_aside};
     use super::*;
@@ -269,6 +280,12 @@ mod tests {
         while !rig.link.has_unsent() {
             rig.send(0, &frame(1));
         }
+        assert_eq!(rig.link.poll_timeout(), Some(Timestamp::ZERO), "to be polled, so that room will wake it");
+        // The kernel finds more room for a while; what counts is that it has none in the end.
+        while rig.poll_once().is_none() {
+            rig.send(0, &frame(1));
+        }
+        rig.expect_silence();
         assert_eq!(rig.link.poll_timeout(), Some(rig.now + Duration::from_secs(10)));
         rig.pass(Duration::from_secs(9));
         rig.expect_silence();
