@@ -216,7 +216,8 @@ def body(steps, rig, listener, client):
         for message in told:
             expect(message.gimbal_device_id == DEVICE, f"device {message.gimbal_device_id}")
             for limit in ("roll_min", "roll_max", "pitch_min", "pitch_max"):
-                expect(math.isclose(getattr(message, limit), getattr(device, limit), abs_tol=1e-6), f"{limit}: {message}")
+                same = math.isclose(getattr(message, limit), getattr(device, limit), abs_tol=1e-6)
+                expect(same, f"{limit} is not the device's {getattr(device, limit)}: {message}")
             # The simulated device turns without end; a slider in a ground station needs numbers.
             expect(math.isclose(message.yaw_min, -math.pi, abs_tol=1e-6), f"yaw_min {message.yaw_min}")
             expect(math.isclose(message.yaw_max, math.pi, abs_tol=1e-6), f"yaw_max {message.yaw_max}")
@@ -246,7 +247,8 @@ def body(steps, rig, listener, client):
         for at, ack in client.heard("COMMAND_ACK"):
             expect((ack.target_system, ack.target_component) == CLIENT, f"for another: {ack}")
             expect(ack.result != mavlink.MAV_RESULT_IN_PROGRESS, f"in progress: {ack}")
-        strays = [frame for frame in ours(ground + autopilot + serial, "COMMAND_ACK") if frame.message.target_system == 255]
+        elsewhere = ours(ground + autopilot + serial, "COMMAND_ACK")
+        strays = [frame for frame in elsewhere if frame.message.target_system == CLIENT[0]]
         expect(not strays, f"{len(strays)} answers to the client went to other links")
 
     def telemetry():

@@ -160,7 +160,8 @@ def main():
 
     def run():
         with Rig("pymavlink-script", system_id=SYSTEM_ID) as rig:
-            with GroundStation(rig.ground_port, 255, SYSTEM_ID) as one, GroundStation(rig.ground_port, 254, SYSTEM_ID) as two:
+            port = rig.ground_port
+            with GroundStation(port, 255, SYSTEM_ID) as one, GroundStation(port, 254, SYSTEM_ID) as two:
                 body(steps, rig, one, two)
 
     steps.script(run)
