@@ -131,8 +131,9 @@ fn on_a_full_line_commands_come_before_streams() {
 
 /// Protocol checklist 155: "… and the other links are not delayed by more than 5 ms."
 ///
-/// Two daemons get the same frames at the same moments, so that whatever else the machine does concerns both; at one
-/// of them a line takes nothing.
+/// Two daemons get the same frames at the same moments, and at one of them a line takes nothing. Each quarter of a
+/// second is judged by itself and the middle one counts, so that it does not matter what else the machine does for a
+/// while; the line is full all the time.
 #[test]
 fn a_line_that_takes_nothing_does_not_delay_the_others() {
     let listening = Relayed::new(true);
@@ -152,9 +153,22 @@ fn a_line_that_takes_nothing_does_not_delay_the_others() {
     }
     let [listening, stalled] = relayed.map(Relayed::end);
 
-    let p99 = |delays: &[Duration]| delays[delays.len() * 99 / 100];
-    let (usual, beside) = (p99(&listening), p99(&stalled));
+    let (usual, beside) = (usual_p99(&listening), usual_p99(&stalled));
     assert!(beside < usual + Duration::from_millis(5), "p99 {beside:?} beside a stalled line, {usual:?} without");
+}
+
+/// The middle one of the 99th percentiles of every hundred frames.
+fn usual_p99(delays: &[Duration]) -> Duration {
+    let mut percentiles: Vec<Duration> = delays
+        .chunks_exact(100)
+        .map(|hundred| {
+            let mut hundred = hundred.to_vec();
+            hundred.sort();
+            hundred[98]
+        })
+        .collect();
+    percentiles.sort();
+    percentiles[percentiles.len() / 2]
 }
 
 /// A daemon between an autopilot and a ground station, with a line besides.
@@ -219,7 +233,7 @@ impl Relayed {
         }
     }
 
-    /// The delays of all frames, the shortest first.
+    /// The delays of all frames, in their order.
     fn end(mut self) -> Vec<Duration> {
         for heard in self.ground.hear_for(Duration::from_millis(200)) {
             assert!(heard.decode::<HEARTBEAT_DATA>().is_some() || heard.source == AUTOPILOT || heard.source == MANAGER);
@@ -227,7 +241,6 @@ impl Relayed {
         assert!(self.delays.len() * 100 >= self.sent_at.len() * 99, "{} of {}", self.delays.len(), self.sent_at.len());
         let stalls = self.daemon.status().links[2].dropped.get("the line takes nothing").copied().unwrap_or(0);
         assert_eq!(stalls > 1_000, !self.reads, "{stalls} frames found the line full");
-        self.delays.sort();
         self.delays
     }
 }
