@@ -4,6 +4,7 @@ mod allocations;
 mod captures;
 mod configuration;
 mod conformance;
+mod daemon;
 mod daemon_pacing;
 mod dialect_oracle;
 mod gimbald;
