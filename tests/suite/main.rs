@@ -3,6 +3,7 @@
 mod captures;
 mod configuration;
 mod conformance;
+mod demo;
 mod dialect_oracle;
 mod gimbald;
 mod properties;
