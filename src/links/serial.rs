@@ -1,11 +1,12 @@
 //! `serial`: a serial port or pseudo-terminal, which may go and come back at any time.
 
-use std::io::{self, Read, Write};
+use std::io;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
-use mio_serial::{ClearBuffer, SerialPort, SerialStream};
 use tokio::io::unix::AsyncFd;
+use tokio::runtime;
+use tokio_serial::{ClearBuffer, SerialPort, SerialStream};
 
 use super::backoff::Backoff;
 use super::frame_queue::FrameQueue;
@@ -78,8 +79,7 @@ impl SerialLink {
 
 impl Port {
     fn open(path: &str, baud: u32) -> io::Result<Self> {
-        // Opens for itself alone (`TIOCEXCL` and a lock) and without blocking.
-        let device = SerialStream::open(&mio_serial::new(path, baud))?;
+        let device = open_apart(path, baud)?;
         // What came in while nobody listened is stale.
         device.clear(ClearBuffer::Input)?;
         Ok(Self { device: watch_input(device)?, output: FrameQueue::new(OUTPUT_LIMIT), retry_at: None, failure: None })
@@ -88,11 +88,11 @@ impl Port {
     fn poll(&mut self, cx: &mut Context<'_>, inbox: &mut Inbox) -> io::Result<Progress> {
         for _ in 0..READS {
             let Some(buffer) = inbox.buffer() else { return Ok(Progress::More) };
-            let mut ready = match self.device.poll_read_ready(cx) {
+            let mut ready = match self.device.poll_read_ready_mut(cx) {
                 Poll::Pending => return Ok(Progress::Idle),
                 Poll::Ready(ready) => ready?,
             };
-            match ready.get_inner().read(&mut buffer[..READ_LENGTH]) {
+            match ready.get_inner_mut().try_read(&mut buffer[..READ_LENGTH]) {
                 Ok(0) => return Err(io::Error::new(io::ErrorKind::UnexpectedEof, "the device is gone")),
                 Ok(length) => {
                     // Fewer bytes than asked for means that there are no more.
@@ -113,8 +113,8 @@ impl Port {
         if self.output.is_empty() {
             return;
         }
-        let device = self.device.get_ref();
-        if let Err(error) = self.output.write(now, |bytes| (&*device).write(bytes)) {
+        let device = self.device.get_mut();
+        if let Err(error) = self.output.write(now, |bytes| device.try_write(bytes)) {
             self.failure = Some(error);
         }
         self.retry_at = self.output.stalled_since().map(|_| now + RETRY_INTERVAL);
@@ -128,6 +128,21 @@ impl Port {
             failures.note(PEER, self.output.drop_unbegun(), "the line takes nothing");
         }
     }
+}
+
+/// Opens a port for itself alone (`TIOCEXCL` and a lock) and without blocking.
+///
+/// A stream of tokio-serial lets its runtime watch for room for output too. It is given one that never runs, so that
+/// only the input is left to watch; `docs/decisions/serial-port.md` has the figures.
+fn open_apart(path: &str, baud: u32) -> io::Result<SerialStream> {
+    let idle = runtime::Builder::new_current_thread().enable_io().build()?;
+    let device = {
+        let _entered = idle.enter();
+        SerialStream::open(&tokio_serial::new(path, baud))
+    };
+    // Has nothing to wait for, and waiting is not allowed inside the event loop.
+    idle.shutdown_background();
+    Ok(device?)
 }
 
 impl Drop for Port {
@@ -202,6 +217,7 @@ impl Link for SerialLink {
 #[cfg(test)]
 mod tests {
     use std::fs::File;
+    use std::io::Write;
     use std::os::fd::AsFd;
     use std::os::unix::fs::symlink;
     use std::path::{Path, PathBuf};
