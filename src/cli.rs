@@ -98,8 +98,11 @@ Examples:
   gimbald scan                                   every serial device
   gimbald scan /dev/ttyUSB0
 
-A port that a running 'gimbald run' holds is left alone.
-Exit codes: 0 when something answered, 69 when not.")]
+A port that a running 'gimbald run' or another program holds is left alone. On the others every usual baud rate is
+tried for about 2.5 seconds, so a port where nobody answers takes 20 seconds. A gimbal may be silent until it hears
+somebody, so a HEARTBEAT is sent (as onboard controller, system 1, component 191), and whoever was heard is asked for
+GIMBAL_DEVICE_INFORMATION. Nothing is sent that moves anything.
+Exit codes: 0 when something answered, 69 when not, 64 for a DEVICE that is no serial port.")]
     Scan(ScanArgs),
 }
 

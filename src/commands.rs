@@ -3,5 +3,6 @@
 pub mod check;
 pub mod demo;
 pub mod run;
+pub mod scan;
 pub mod sim;
 pub mod status;

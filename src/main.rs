@@ -1,11 +1,10 @@
 use std::env;
-use std::io::{self, Write};
+use std::io;
 use std::process;
 
 use gimbald::cli::{Cli, Command};
 use gimbald::commands;
 use gimbald::daemon::logging;
-use gimbald::exit_code::ExitCode;
 
 fn main() -> process::ExitCode {
     let cli = match Cli::read(env::args_os()) {
@@ -19,11 +18,7 @@ fn main() -> process::ExitCode {
         Command::Demo(arguments) => commands::demo::demo(&arguments, &mut io::stdout(), &mut io::stderr()),
         Command::Sim(command) => commands::sim::sim(&command, &mut io::stderr()),
         Command::Status(arguments) => commands::status::status(&arguments, &mut io::stderr()),
-        Command::Scan(_) => {
-            // The exit code says it too; nobody is left to tell when the reader is gone.
-            let _ = writeln!(io::stderr(), "gimbald: built without this command");
-            ExitCode::Unavailable
-        }
+        Command::Scan(arguments) => commands::scan::scan(&arguments, &mut io::stdout(), &mut io::stderr()),
     }
     .into()
 }

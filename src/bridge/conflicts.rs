@@ -24,6 +24,8 @@ pub enum Conflict {
     OwnIdInUse { id: MavId },
     /// More than one autopilot on autopilot links while the system id is to be found out.
     SeveralAutopilots,
+    /// The autopilot has another system id than the configuration names.
+    AutopilotElsewhere { autopilot: MavId, system: u8 },
     /// A gimbal on another system id than the vehicle's.
     ForeignSystem { device: MavId, system: u8 },
     /// No manager component id is left.
@@ -53,6 +55,10 @@ impl Conflict {
             Self::SeveralAutopilots => "several autopilots were heard on autopilot links. Set [vehicle] system_id to \
                                         the one this gimbal belongs to."
                 .to_owned(),
+            Self::AutopilotElsewhere { autopilot, system } => format!(
+                "the autopilot sends as {autopilot}, but [vehicle] system_id is {system}. Set it to \"auto\" or to {}.",
+                autopilot.system
+            ),
             Self::ForeignSystem { device, system } => format!(
                 "gimbal {device} is not on the vehicle's system id {system}; ground stations will not show it with the \
                  vehicle. Set its system id to {system}."

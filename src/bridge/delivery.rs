@@ -65,21 +65,26 @@ impl Bridge {
         if !is_autopilot || source.system == 0 {
             return;
         }
-        self.vehicles[usize::from(source.system)] = true;
+        let known = &mut self.vehicles[usize::from(source.system)];
+        if known.is_none() || source.component == component::AUTOPILOT1 {
+            *known = Some(source.component);
+        }
         if role == Role::Autopilot {
             self.identity.handle_autopilot(now, source.system);
         }
         self.settle_identity(now);
-        if Some(source.system) == self.identity.system() {
-            let better = source.component == component::AUTOPILOT1;
-            let known = self.autopilot.filter(|known| known.system == source.system);
-            if known.is_none() || (better && known != Some(source)) {
-                tracing::info!(autopilot = %source, "autopilot found");
-                self.autopilot = Some(source);
-                self.streams.handle_autopilot_found(now);
-            } else if !self.vehicle.alive(now) {
-                self.streams.handle_autopilot_found(now);
+        let Some(system) = self.identity.system() else { return };
+        if source.system != system {
+            if role == Role::Autopilot && self.identity.is_fixed() {
+                self.conflicts.note(now, Conflict::AutopilotElsewhere { autopilot: source, system });
             }
+            return;
+        }
+        let better = source.component == component::AUTOPILOT1 && self.autopilot != Some(source);
+        if self.autopilot.is_none() || better {
+            self.take_autopilot(now, source);
+        } else if !self.vehicle.alive(now) {
+            self.streams.handle_autopilot_found(now);
         }
     }
 
@@ -141,7 +146,7 @@ impl Bridge {
         }
         let Some(request) = read_request(frame) else { return };
         let sender = Sender { id: frame.source(), channel: from };
-        let other_vehicle = sender.id.system != system && self.vehicles[usize::from(sender.id.system)];
+        let other_vehicle = sender.id.system != system && self.vehicles[usize::from(sender.id.system)].is_some();
         let around = Surroundings { vehicle: &self.vehicle, autopilot: self.autopilot, overheard, other_vehicle };
         for gimbal in self.roster.iter_mut().filter(|gimbal| for_us(gimbal.component)) {
             match &request {

@@ -68,6 +68,15 @@ pub fn status(arguments: &StatusArgs, errors: &mut impl Write) -> ExitCode {
     }
 }
 
+/// What the daemon at `url` tells.
+pub(super) async fn snapshot(url: &str) -> Result<Snapshot, StatusError> {
+    let target = Target::parse(url)?;
+    let answer = fetch(&target).await?;
+    let not_gimbald =
+        |error: serde_json::Error| StatusError::NotGimbald { url: url.to_owned(), what: error.to_string() };
+    serde_json::from_slice(&answer).map_err(not_gimbald)
+}
+
 /// Prints the status once, or until Ctrl-C; while watching, a daemon that does not answer is shown and asked again.
 fn run(options: &StatusArgs) -> Result<(), StatusError> {
     let target = Target::parse(&options.url)?;
@@ -131,12 +140,18 @@ fn report(answer: &[u8], target: &Target, json: bool) -> Result<String, StatusEr
 }
 
 /// Names come from devices: nothing in them may move the cursor or turn the writing round.
+pub(super) fn printable_text(text: &str) -> String {
+    text.replace(commands_the_terminal, "\u{fffd}")
+}
+
+/// The same for every text in a value.
 fn printable(value: Value) -> Value {
-    let plain = |text: String| text.replace(commands_the_terminal, "\u{fffd}");
     match value {
-        Value::String(text) => Value::String(plain(text)),
-        Value::Array(items) => items.into_iter().map(printable).collect(),
-        Value::Object(entries) => entries.into_iter().map(|(key, value)| (plain(key), printable(value))).collect(),
+        Value::String(text) => Value::String(printable_text(&text)),
+        Value::Array(items) => Value::Array(items.into_iter().map(printable).collect()),
+        Value::Object(entries) => {
+            entries.into_iter().map(|(key, value)| (printable_text(&key), printable(value))).collect()
+        }
         Value::Null | Value::Bool(_) | Value::Number(_) => value,
     }
 }

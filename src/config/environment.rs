@@ -1,10 +1,13 @@
 //! Lays `GIMBALD__SECTION__KEY` and `GIMBALD__LINK__NAME__KEY` over what the file says.
 
+use ::config::{Environment, Map, Source};
+
 use super::document::{Raw, Table, Value};
 use super::problem::{Place, Problem};
 use super::suggestion;
 
 pub(super) const PREFIX: &str = "GIMBALD__";
+const SEPARATOR: &str = "__";
 
 /// Sections that there is one of.
 const SINGLE: [&str; 4] = ["vehicle", "control", "roi", "http"];
@@ -20,26 +23,37 @@ pub(super) fn spelling(name: &str) -> String {
 pub(super) fn apply(root: &mut Table, variables: Vec<(String, String)>, problems: &mut Vec<Problem>) {
     for (name, text) in variables {
         let place = Place::Variable(name.clone());
-        if let Err((found, expected)) = apply_one(root, &name, text) {
-            problems.push(Problem { place, key: String::new(), found, expected });
+        for (path, text) in collect(name, text) {
+            let value = Value { place: place.clone(), raw: Raw::Variable(text) };
+            if let Err((found, expected)) = lay_over(root, &path, value) {
+                problems.push(Problem { place: place.clone(), key: String::new(), found, expected });
+            }
         }
     }
 }
 
-/// Finds what `name` stands for; the error is what was found and what is expected.
-fn apply_one(root: &mut Table, name: &str, text: String) -> Result<(), (String, String)> {
-    let path = name.strip_prefix(PREFIX).unwrap_or(name).to_ascii_lowercase();
-    let (section, rest) = path.split_once("__").unwrap_or((&path, ""));
-    let value = Value { place: Place::Variable(name.to_owned()), raw: Raw::Variable(text) };
+/// One variable as path (`link.ground.endpoint`) and text. One by one, because only paths come out.
+fn collect(name: String, text: String) -> impl Iterator<Item = (String, String)> {
+    let variable = Map::from_iter([(name, text)]);
+    let source = Environment::default().prefix("GIMBALD").separator(SEPARATOR).source(Some(variable));
+    let values = source.collect().expect("only bytes that are no UTF-8 are an error");
+    values.into_iter().map(|(path, value)| (path, value.into_string().expect("it stays the text that it is")))
+}
+
+/// Finds what `path` stands for; the error is what was found and what is expected.
+fn lay_over(root: &mut Table, path: &str, value: Value) -> Result<(), (String, String)> {
+    let (section, rest) = path.split_once('.').unwrap_or((path, ""));
+    let rest = rest.replace('.', SEPARATOR);
     if SINGLE.contains(&section) && !rest.is_empty() {
         let empty = Value { place: value.place.clone(), raw: Raw::Table(Table::new()) };
         // A section of the wrong kind is reported when it is read.
         if let Raw::Table(table) = &mut root.entry(section.to_owned()).or_insert(empty).raw {
-            table.insert(rest.to_owned(), value);
+            table.insert(rest, value);
         }
         return Ok(());
     }
-    let Some((entry, key)) = rest.rsplit_once("__").filter(|_| NAMED.contains(&section)) else {
+    // A name may hold `__` itself, and `_` beside it: the key is what stands behind the last.
+    let Some((entry, key)) = rest.rsplit_once(SEPARATOR).filter(|_| NAMED.contains(&section)) else {
         let sections = SINGLE.into_iter().chain(NAMED).filter(|known| *known != section);
         let hint = suggestion::closest(section, sections)
             .map(|meant| format!("; did you mean {PREFIX}{}__?", meant.to_uppercase()))

@@ -122,7 +122,7 @@ impl Routes {
         self.rebuild();
     }
 
-    /// Forgets what was not heard for [`ROUTE_EXPIRY`].
+    /// Forgets what was not heard for a minute.
     pub fn expire(&mut self, now: Timestamp) {
         if now < self.next_expiry {
             return;

@@ -396,6 +396,49 @@ fn a_wrong_variable_is_named() {
     assert_eq!(check(LINK, &variables), refused(&lines));
 }
 
+/// A name may hold the `__` that separates the parts of a variable, and `_` beside it.
+#[test]
+fn variables_reach_names_with_underscores() {
+    for (name, variable) in [
+        ("a_", "GIMBALD__LINK__A___ROLE"),
+        ("nose__cam", "GIMBALD__LINK__NOSE__CAM__ROLE"),
+        ("nose--cam", "GIMBALD__LINK__NOSE__CAM__ROLE"),
+    ] {
+        let text =
+            format!("{}{LINK}", LINK.replace("\"ground\"\nrole", &format!("{name:?}\nrole")).replace("14550", "1"));
+        let loaded = load(&text, &[(variable, "peer")]).expect(variable);
+        let roles: Vec<Role> = loaded.core.links.iter().map(|link| link.role).collect();
+        assert_eq!(roles, [Role::Peer, Role::Ground], "{name}");
+        assert_eq!(
+            check(&text, &[(&variable.replace("ROLE", "NAME"), "x"), (&variable.replace("ROLE", "COLOUR"), "x")])
+                .errors,
+            format!(
+                "{}: link.{name}.colour: unknown key; expected one of name, role, endpoint, max_rate_hz\n\
+                 {}: a variable for a name; expected names to be set in the file\n",
+                variable.replace("ROLE", "COLOUR"),
+                variable.replace("ROLE", "NAME")
+            )
+        );
+    }
+}
+
+/// What looks like a number or a flag stays what was written until a setting asks for it.
+#[test]
+fn variables_are_taken_as_what_their_setting_is() {
+    let text = format!(
+        "{}{LINK}[[gimbal]]\nname = \"camera\"\n",
+        LINK.replace("\"ground\"\nrole", "\"007\"\nrole").replace("14550", "1")
+    );
+    let loaded = load(&text, &[("GIMBALD__GIMBAL__CAMERA__LINK", "007")]).expect("the name of a link");
+    assert_eq!(loaded.core.gimbals[0].link, Some(0));
+    let variables = [("GIMBALD__CONTROL__SNOOP_AUTOPILOT", "TRUE"), ("GIMBALD__VEHICLE__SYSTEM_ID", "yes")];
+    let lines = [
+        r#"GIMBALD__CONTROL__SNOOP_AUTOPILOT: control.snoop_autopilot: found "TRUE"; expected true or false"#,
+        r#"GIMBALD__VEHICLE__SYSTEM_ID: vehicle.system_id: found "yes"; expected "auto" or a whole number from 1 to 255"#,
+    ];
+    assert_eq!(check(LINK, &variables), refused(&lines));
+}
+
 /// `config::load` of a file with this text.
 fn load(text: &str, variables: &[(&str, &str)]) -> Result<DaemonSettings, Problems> {
     let folder = tempfile::tempdir().expect("a temporary folder");

@@ -1,0 +1,457 @@
+//! `gimbald scan`: which serial port, baud rate and gimbal family answer.
+
+mod conversation;
+mod ports;
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+
+use mio_serial::{ClearBuffer, SerialPort, SerialStream};
+use tokio::io::unix::AsyncFd;
+use tokio::time::timeout;
+
+use self::conversation::{Conversation, Party};
+use self::ports::{Port, PortError};
+use super::status::{self, StatusError};
+use crate::bridge::settings::Role;
+use crate::cli::ScanArgs;
+use crate::config::settings::HttpSettings;
+use crate::daemon::clock::Clock;
+use crate::endpoint::Endpoint;
+use crate::exit_code::ExitCode;
+use crate::links::input_ready::watch_input;
+use crate::wire::MavId;
+
+/// The likely ones first.
+const BAUDS: [u32; 8] = [115_200, 921_600, 57_600, 230_400, 460_800, 500_000, 1_000_000, 38_400];
+
+/// Why a scan could not be made.
+#[derive(Debug, thiserror::Error)]
+enum ScanError {
+    #[error("{}: {cause}", path.display())]
+    NoSuchPort { path: PathBuf, cause: io::Error },
+    #[error("{}: not a serial port, or one without hardware; expected a device such as /dev/ttyUSB0", .0.display())]
+    NotASerialPort(PathBuf),
+    #[error("no serial ports found")]
+    NoPorts,
+    #[error("nothing answered")]
+    NothingAnswered,
+    #[error("the scan could not be started: {0}")]
+    Runtime(#[source] io::Error),
+}
+
+impl ScanError {
+    fn exit_code(&self) -> ExitCode {
+        match self {
+            Self::NotASerialPort(_) => ExitCode::Usage,
+            Self::NoSuchPort { .. } | Self::NoPorts | Self::NothingAnswered | Self::Runtime(_) => ExitCode::Unavailable,
+        }
+    }
+}
+
+/// Tries the ports one after the other; findings go to `output`, progress and problems to `errors`.
+pub fn scan(arguments: &ScanArgs, output: &mut impl Write, errors: &mut impl Write) -> ExitCode {
+    let daemon = format!("http://{}", HttpSettings::DEFAULT_LISTEN);
+    match run(arguments.device.as_deref(), &daemon, output, errors) {
+        Ok(()) => ExitCode::Ok,
+        Err(error) => {
+            say(errors, format_args!("gimbald scan: {error}"));
+            error.exit_code()
+        }
+    }
+}
+
+fn run(device: Option<&Path>, daemon: &str, output: &mut impl Write, errors: &mut impl Write) -> Result<(), ScanError> {
+    let ports = match device {
+        Some(path) => {
+            vec![Port::at(path).map_err(|cause| ScanError::NoSuchPort { path: path.to_owned(), cause })?]
+        }
+        None => ports::all(Path::new("/dev")),
+    };
+    if ports.is_empty() {
+        return Err(ScanError::NoPorts);
+    }
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build();
+    runtime.map_err(ScanError::Runtime)?.block_on(async {
+        let held = held_by_daemon(daemon, errors).await;
+        let mut names = Names::default();
+        for port in ports {
+            let shown = port.name.display();
+            if held.contains(&port.device) {
+                say(errors, format_args!("{shown}: left alone, it belongs to the running gimbald"));
+                continue;
+            }
+            match try_port(&port, errors).await {
+                Ok(Some(finding)) => {
+                    say(output, format_args!("{}", finding.described(&mut names)));
+                }
+                Ok(None) => say(errors, format_args!("{shown}: nothing answers")),
+                Err(TryError::Port(PortError::NotASerialPort)) => {
+                    if device.is_some() {
+                        return Err(ScanError::NotASerialPort(port.name));
+                    }
+                }
+                Err(error) => say(errors, format_args!("{shown}: {error}")),
+            }
+        }
+        if names.0.is_empty() { Err(ScanError::NothingAnswered) } else { Ok(()) }
+    })
+}
+
+/// The devices of the daemon's serial links, which it opens again whenever they are free.
+async fn held_by_daemon(url: &str, errors: &mut impl Write) -> Vec<PathBuf> {
+    match status::snapshot(url).await {
+        Ok(snapshot) => {
+            let paths = snapshot.links.into_iter().filter_map(|link| match link.endpoint.parse() {
+                Ok(Endpoint::Serial { path, .. }) => Some(path),
+                Ok(_) | Err(_) => None,
+            });
+            // A path that leads nowhere leads to none of the ports that are there.
+            paths.filter_map(|path| Port::at(Path::new(&path)).ok()).map(|port| port.device).collect()
+        }
+        Err(StatusError::Unreachable { .. }) => Vec::new(),
+        Err(error) => {
+            say(errors, format_args!("which ports a running gimbald has cannot be asked ({error}); locks tell"));
+            Vec::new()
+        }
+    }
+}
+
+#[derive(Debug, thiserror::Error)]
+enum TryError {
+    #[error(transparent)]
+    Port(#[from] PortError),
+    #[error("lost: {0}")]
+    Lost(#[from] io::Error),
+}
+
+/// Tries each baud rate until somebody answers.
+async fn try_port(port: &Port, errors: &mut impl Write) -> Result<Option<Finding>, TryError> {
+    let mut device = watch_input(port.open(BAUDS[0])?)?;
+    let clock = Clock::start();
+    for baud in BAUDS {
+        if let Err(error) = device.get_mut().set_baud_rate(baud) {
+            say(errors, format_args!("{}: {baud} baud: {error}", port.name.display()));
+            continue;
+        }
+        say(errors, format_args!("{}: {baud} baud …", port.name.display()));
+        // What came in, or waits to go out, at another rate is noise at this one.
+        device.get_ref().clear(ClearBuffer::All).map_err(io::Error::from)?;
+        let parties = converse(&mut device, baud, clock).await?;
+        if !parties.is_empty() {
+            return Ok(Some(Finding { port: port.clone(), baud, parties }));
+        }
+    }
+    Ok(None)
+}
+
+/// Speaks with whoever is at the other end, for as long as it is worth it.
+async fn converse(device: &mut AsyncFd<SerialStream>, baud: u32, clock: Clock) -> io::Result<BTreeMap<MavId, Party>> {
+    let mut conversation = Conversation::new(clock.now(), baud);
+    let mut buffer = [0; 4096];
+    loop {
+        let now = clock.now();
+        if conversation.is_over(now) {
+            return Ok(conversation.into_parties());
+        }
+        conversation.handle_timeout(now);
+        while let Some(frame) = conversation.poll_output() {
+            match device.get_mut().write(&frame) {
+                Ok(_) => {}
+                // A line that takes nothing has nobody who answers; what is cut off is repeated.
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+                Err(error) => return Err(error),
+            }
+        }
+        let Ok(ready) = timeout(conversation.poll_timeout().since(now), device.readable_mut()).await else { continue };
+        let mut ready = ready?;
+        match ready.get_inner_mut().read(&mut buffer) {
+            Ok(0) => return Err(io::Error::new(io::ErrorKind::UnexpectedEof, "the device is gone")),
+            Ok(length) => conversation.handle_received(clock.now(), &buffer[..length]),
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock => ready.clear_ready(),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+}
+
+/// Who answered, and where.
+#[derive(Debug)]
+struct Finding {
+    port: Port,
+    baud: u32,
+    /// Not empty.
+    parties: BTreeMap<MavId, Party>,
+}
+
+/// The names that were given to links so far.
+#[derive(Debug, Default)]
+struct Names(Vec<String>);
+
+impl Names {
+    /// `name`, or with a number behind it when that is taken.
+    fn take(&mut self, name: &str) -> String {
+        let others = self.0.iter().filter(|taken| taken.split('-').next() == Some(name)).count();
+        let name = if others == 0 { name.to_owned() } else { format!("{name}-{}", others + 1) };
+        self.0.push(name.clone());
+        name
+    }
+}
+
+impl Finding {
+    fn role(&self) -> Role {
+        let any = |is: fn(&Party) -> bool| self.parties.values().any(is);
+        if any(Party::is_autopilot) {
+            Role::Autopilot
+        } else if any(|party| party.is_gimbal_device) {
+            Role::Gimbal
+        } else if any(Party::is_ground_station) {
+            Role::Ground
+        } else {
+            Role::Peer
+        }
+    }
+
+    fn described(&self, names: &mut Names) -> String {
+        let role = self.role().name();
+        let path = self.port.name.display();
+        let endpoint = toml::Value::String(format!("serial:{path}:{}", self.baud));
+        let parties: String = self.parties.iter().map(|(id, party)| format!("  {id}: {party}\n")).collect();
+        let name = names.take(role);
+        format!(
+            "{path}: {} baud\n{parties}\n[[link]]\nname = \"{name}\"\nrole = \"{role}\"\nendpoint = {endpoint}\n",
+            self.baud
+        )
+    }
+}
+
+impl fmt::Display for Party {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if !self.is_gimbal_device {
+            return write!(f, "MAVLink, no gimbal device");
+        }
+        write!(f, "mavlink_v2")?;
+        let Some(identity) = &self.identity else { return write!(f, ", which does not tell its make") };
+        for name in [&identity.vendor, &identity.model, &identity.custom_name] {
+            if !name.is_empty() {
+                write!(f, ", {}", status::printable_text(name))?;
+            }
+        }
+        match identity.firmware {
+            Some([major, minor, patch, 0]) => write!(f, ", firmware {major}.{minor}.{patch}"),
+            Some([major, minor, patch, development]) => write!(f, ", firmware {major}.{minor}.{patch}-{development}"),
+            None => Ok(()),
+        }
+    }
+}
+
+fn say(to: &mut impl Write, line: fmt::Arguments<'_>) {
+    // The exit code says it too; nobody is left to tell when the reader is gone.
+    let _ = writeln!(to, "{line}").and_then(|()| to.flush());
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::File;
+    use std::net::TcpListener;
+    use std::os::fd::{AsFd, OwnedFd};
+    use std::os::unix::fs::symlink;
+    use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
+    use std::thread::JoinHandle;
+    use std::time::Duration;
+
+    use nix::errno::Errno;
+    use nix::fcntl::{FcntlArg, OFlag, fcntl};
+    use nix::pty::openpty;
+    use nix::unistd::{read, ttyname, write};
+
+    use super::*;
+    use crate::gimbals::mavlink_v2::sim::{Device, DeviceSettings};
+    use crate::sim::peer::Peer;
+    use crate::sim::vehicle::{Vehicle, VehicleSettings};
+    use crate::timestamp::Timestamp;
+    use crate::wire::DatagramFrames;
+
+    /// A peer behind a pseudo-terminal, which understands one of the baud rates that are tried, counted from one.
+    ///
+    /// A pseudo-terminal passes bytes on at any rate; each attempt begins with a frame of sequence number 0.
+    struct Plugged {
+        path: PathBuf,
+        /// Never opened by the peer, but there for as long as it is.
+        far: Option<OwnedFd>,
+        stop: Sender<()>,
+        thread: JoinHandle<usize>,
+    }
+
+    impl Plugged {
+        fn new(peer: impl Peer + Send + 'static, understood: usize) -> Self {
+            let pty = openpty(None, None).expect("a pseudo-terminal");
+            fcntl(pty.master.as_fd(), FcntlArg::F_SETFL(OFlag::O_NONBLOCK)).expect("it takes the flag");
+            let path = ttyname(&pty.slave).expect("it has a name");
+            let (stop, stopped) = channel();
+            let thread = std::thread::spawn(move || live(peer, &pty.master, understood, &stopped));
+            Self { path, far: Some(pty.slave), stop, thread }
+        }
+
+        /// Takes the peer away: at how many baud rates it was spoken to.
+        fn end(self) -> usize {
+            self.stop.send(()).expect("it still lives");
+            self.thread.join().expect("no panic")
+        }
+    }
+
+    fn live(mut peer: impl Peer, line: &OwnedFd, understood: usize, stopped: &Receiver<()>) -> usize {
+        let clock = Clock::start();
+        let mut attempts = 0;
+        let mut buffer = [0; 1024];
+        while stopped.try_recv() == Err(TryRecvError::Empty) {
+            let now = clock.now();
+            match read(line, &mut buffer) {
+                Ok(length) => {
+                    let mut frames = DatagramFrames::new(&buffer[..length]);
+                    while let Some(frame) = frames.next_frame() {
+                        attempts += usize::from(frame.sequence() == 0);
+                    }
+                    if attempts == understood {
+                        peer.handle_received(now, &buffer[..length]);
+                    }
+                }
+                Err(Errno::EAGAIN | Errno::EIO | Errno::EINTR) => {}
+                Err(error) => panic!("{error}"),
+            }
+            peer.handle_timeout(now);
+            while let Some(bytes) = peer.poll_output() {
+                let heard = if attempts == understood { &bytes[..] } else { &[0x55; 16] };
+                assert_eq!(write(line, heard), Ok(heard.len()));
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        attempts
+    }
+
+    /// An address where no daemon answers.
+    fn no_daemon() -> String {
+        let free = TcpListener::bind("127.0.0.1:0").expect("a port");
+        format!("http://{}", free.local_addr().expect("it is bound"))
+    }
+
+    fn scan_at(path: &Path, daemon: &str) -> (Result<(), ScanError>, String, String) {
+        let (mut output, mut errors) = (Vec::new(), Vec::new());
+        let result = run(Some(path), daemon, &mut output, &mut errors);
+        let text = |bytes| String::from_utf8(bytes).expect("text");
+        (result, text(output), text(errors))
+    }
+
+    /// "Reports device, baud, system/component, family, vendor, model, firmware, and the [[link]] lines to paste."
+    #[test]
+    fn a_gimbal_is_found_at_its_baud_rate() {
+        let settings = DeviceSettings { listens_first: None, ..DeviceSettings::default() };
+        let gimbal = Plugged::new(Device::new(Timestamp::ZERO, settings), 2);
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("by id:gimbal");
+        symlink(&gimbal.path, &path).expect("a link");
+
+        let (result, output, errors) = scan_at(&path, &no_daemon());
+
+        result.expect("it answers");
+        let shown = path.display();
+        let expected = format!(
+            "{shown}: 921600 baud\n  1/154: mavlink_v2, gimbald, Simulated v2, firmware 1.0.0\n\n\
+             [[link]]\nname = \"gimbal\"\nrole = \"gimbal\"\nendpoint = \"serial:{shown}:921600\"\n\n"
+        );
+        assert_eq!(output, expected);
+        assert_eq!(errors, format!("{shown}: 115200 baud …\n{shown}: 921600 baud …\n"));
+        assert_eq!(gimbal.end(), 2);
+    }
+
+    #[test]
+    fn an_autopilot_is_said_to_be_no_gimbal() {
+        let time = Timestamp::ZERO;
+        let autopilot = Plugged::new(Vehicle::new(time, VehicleSettings::default()), 1);
+
+        let (result, output, _) = scan_at(&autopilot.path, &no_daemon());
+
+        result.expect("it answers");
+        let shown = autopilot.path.display();
+        let expected = format!(
+            "{shown}: 115200 baud\n  1/1: MAVLink, no gimbal device\n\n\
+             [[link]]\nname = \"autopilot\"\nrole = \"autopilot\"\nendpoint = \"serial:{shown}:115200\"\n\n"
+        );
+        assert_eq!(output, expected);
+        autopilot.end();
+    }
+
+    /// "Never opens those."
+    #[test]
+    fn a_port_of_the_running_daemon_is_left_alone() {
+        let mut gimbal = Plugged::new(Device::new(Timestamp::ZERO, DeviceSettings::default()), 1);
+        let mut snapshot = crate::http::canned::snapshot();
+        snapshot.links[0].endpoint = format!("serial:{}:57600", gimbal.path.display());
+        let body = serde_json::to_string(&snapshot).expect("JSON");
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+        let daemon = format!("http://{}", listener.local_addr().expect("it is bound"));
+        let server = std::thread::spawn(move || {
+            let (mut client, _) = listener.accept().expect("a client");
+            let mut asked = Vec::new();
+            while !asked.ends_with(b"\r\n\r\n") {
+                let mut byte = [0];
+                client.read_exact(&mut byte).expect("a request");
+                asked.push(byte[0]);
+            }
+            write!(client, "HTTP/1.1 200 OK\r\nContent-Length: {}\r\n\r\n{body}", body.len()).expect("it listens");
+        });
+
+        // An open far end would hide that somebody else opens and closes it.
+        gimbal.far = None;
+        let (result, output, errors) = scan_at(&gimbal.path, &daemon);
+
+        server.join().expect("no panic");
+        let error = result.expect_err("left alone");
+        assert_eq!(
+            (error.exit_code(), error.to_string().as_str(), output.as_str()),
+            (ExitCode::Unavailable, "nothing answered", "")
+        );
+        assert_eq!(errors, format!("{}: left alone, it belongs to the running gimbald\n", gimbal.path.display()));
+        assert_eq!(gimbal.end(), 0);
+    }
+
+    /// "69 when not, 64 for a DEVICE that is no tty (clear text)."
+    #[test]
+    fn wrong_devices_have_their_exit_codes() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (file, gone) = (folder.path().join("file"), folder.path().join("gone"));
+        File::create(&file).expect("a file");
+
+        let error = scan_at(&file, &no_daemon()).0.expect_err("no terminal");
+        let text = format!(
+            "{}: not a serial port, or one without hardware; expected a device such as /dev/ttyUSB0",
+            file.display()
+        );
+        assert_eq!((error.exit_code(), error.to_string()), (ExitCode::Usage, text));
+        let error = scan_at(&gone, &no_daemon()).0.expect_err("not there");
+        let text = format!("{}: No such file or directory (os error 2)", gone.display());
+        assert_eq!((error.exit_code(), error.to_string()), (ExitCode::Unavailable, text));
+    }
+
+    /// Names come from devices.
+    #[test]
+    fn names_of_gimbals_do_not_command_the_terminal() {
+        let identity = crate::gimbals::report::Identity { vendor: "a\u{202e}b".to_owned(), ..Default::default() };
+        let mut party = Party::default();
+        party.is_gimbal_device = true;
+        assert_eq!(party.to_string(), "mavlink_v2, which does not tell its make");
+        party.identity = Some(identity);
+        assert_eq!(party.to_string(), "mavlink_v2, a\u{fffd}b");
+    }
+
+    #[test]
+    fn two_links_of_one_role_have_two_names() {
+        let mut names = Names::default();
+        assert_eq!(
+            ["gimbal", "autopilot", "gimbal", "gimbal"].map(|name| names.take(name)),
+            ["gimbal", "autopilot", "gimbal-2", "gimbal-3"]
+        );
+    }
+}

@@ -1,0 +1,315 @@
+//! What is said to find out who is at the other end of a line, and what is made of the answers.
+//!
+//! A plain value: bytes and the time go in, frames come out. Sends HEARTBEAT and, to those that were heard, a request
+//! for `GIMBAL_DEVICE_INFORMATION`; nothing that moves anything.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::time::Duration;
+
+use crate::gimbals::mavlink_v2::packet;
+use crate::gimbals::report::Identity;
+use crate::timestamp::Timestamp;
+use crate::wire::decoder::Patience;
+use crate::wire::dialect::{HEARTBEAT_DATA, MavMessage};
+use crate::wire::ids::{component, mav_autopilot, mav_state, mav_type, message};
+use crate::wire::{Frame, FrameBuffer, MavId, StreamDecoder, Target};
+
+/// Who asks.
+pub const SCANNER: MavId = MavId::new(1, component::ONBOARD_COMPUTER);
+
+/// Whoever lives beats once a second; after this nobody is expected at this baud rate any more.
+pub const SILENCE: Duration = Duration::from_millis(2_500);
+/// How long the parties on a line have to show themselves, and to answer, from the first frame on.
+const INTRODUCTION: Duration = Duration::from_millis(2_500);
+/// How long others on the line have to show themselves when a gimbal has told what it is.
+const OTHERS: Duration = Duration::from_millis(1_100);
+const HEARTBEAT_INTERVAL: Duration = Duration::from_secs(1);
+const REQUEST_INTERVAL: Duration = Duration::from_millis(500);
+
+/// One attempt at one baud rate.
+#[derive(Debug)]
+pub struct Conversation {
+    decoder: StreamDecoder,
+    ends_at: Timestamp,
+    heartbeat_at: Timestamp,
+    /// Nothing is asked before somebody was heard.
+    request_at: Option<Timestamp>,
+    sequence: u8,
+    unsent: VecDeque<Vec<u8>>,
+    /// To know an echo.
+    sent: Vec<Vec<u8>>,
+    parties: BTreeMap<MavId, Party>,
+}
+
+/// Somebody on the line.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Party {
+    frames: u32,
+    /// `MAV_TYPE` and `MAV_AUTOPILOT`.
+    heartbeat: Option<(u8, u8)>,
+    /// 283 or 285 was heard from it.
+    pub is_gimbal_device: bool,
+    pub identity: Option<Identity>,
+}
+
+impl Party {
+    /// One frame of noise has a right checksum now and then, two from the same source do not.
+    fn is_real(&self) -> bool {
+        self.heartbeat.is_some() || self.frames >= 2
+    }
+
+    pub fn is_autopilot(&self) -> bool {
+        self.heartbeat.is_some_and(|(kind, autopilot)| {
+            autopilot != mav_autopilot::INVALID && !mav_type::NOT_A_VEHICLE.contains(&kind)
+        })
+    }
+
+    pub fn is_ground_station(&self) -> bool {
+        self.heartbeat.is_some_and(|(kind, _)| kind == mav_type::GCS)
+    }
+}
+
+impl Conversation {
+    pub fn new(now: Timestamp, baud: u32) -> Self {
+        Self {
+            decoder: StreamDecoder::new(Patience::Serial { baud }),
+            ends_at: now + SILENCE,
+            heartbeat_at: now,
+            request_at: None,
+            sequence: 0,
+            unsent: VecDeque::new(),
+            sent: Vec::new(),
+            parties: BTreeMap::new(),
+        }
+    }
+
+    pub fn handle_received(&mut self, now: Timestamp, bytes: &[u8]) {
+        self.decoder.push(now, bytes);
+        self.read_frames(now);
+    }
+
+    pub fn handle_timeout(&mut self, now: Timestamp) {
+        self.decoder.handle_timeout(now);
+        self.read_frames(now);
+        if now >= self.heartbeat_at {
+            self.heartbeat_at = now + HEARTBEAT_INTERVAL;
+            self.send(&MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+                custom_mode: 0,
+                mavtype: mav_type::ONBOARD_CONTROLLER,
+                autopilot: mav_autopilot::INVALID,
+                base_mode: 0,
+                system_status: mav_state::ACTIVE,
+                mavlink_version: 3,
+            }));
+        }
+        if self.request_at.is_some_and(|at| now >= at) {
+            self.request_at = Some(now + REQUEST_INTERVAL);
+            self.send(&packet::request_message(Target::Everyone, message::GIMBAL_DEVICE_INFORMATION));
+        }
+    }
+
+    /// The next frame to send.
+    pub fn poll_output(&mut self) -> Option<Vec<u8>> {
+        self.unsent.pop_front()
+    }
+
+    pub fn poll_timeout(&self) -> Timestamp {
+        let timers = [self.decoder.poll_timeout(), self.request_at, Some(self.heartbeat_at), Some(self.ends_at)];
+        timers.into_iter().flatten().min().unwrap_or(self.ends_at)
+    }
+
+    pub fn is_over(&self, now: Timestamp) -> bool {
+        now >= self.ends_at
+    }
+
+    /// Who was there; empty when nobody speaks MAVLink at this baud rate.
+    pub fn into_parties(self) -> BTreeMap<MavId, Party> {
+        self.parties.into_iter().filter(|(_, party)| party.is_real()).collect()
+    }
+
+    fn read_frames(&mut self, now: Timestamp) {
+        let mut decoder = std::mem::take(&mut self.decoder);
+        while let Some(frame) = decoder.next_frame() {
+            // A frame that no definition describes has no checksum to tell it from noise.
+            if frame.is_known() && !self.sent.iter().any(|sent| sent == frame.bytes()) {
+                self.note(now, &frame);
+            }
+        }
+        self.decoder = decoder;
+    }
+
+    fn note(&mut self, now: Timestamp, frame: &Frame<'_>) {
+        if self.request_at.is_none() {
+            self.request_at = Some(now);
+            self.ends_at = now + INTRODUCTION;
+        }
+        let party = self.parties.entry(frame.source()).or_default();
+        party.frames = party.frames.saturating_add(1);
+        if let Some(heartbeat) = frame.decode::<HEARTBEAT_DATA>() {
+            party.heartbeat = Some((heartbeat.mavtype, heartbeat.autopilot));
+        }
+        if let Some(information) = packet::read_information(frame) {
+            if party.identity.is_none() {
+                self.ends_at = self.ends_at.min(now + OTHERS);
+            }
+            party.identity = Some(information.identity);
+        }
+        party.is_gimbal_device |=
+            matches!(frame.message_id(), message::GIMBAL_DEVICE_INFORMATION | message::GIMBAL_DEVICE_ATTITUDE_STATUS);
+    }
+
+    fn send(&mut self, message: &MavMessage) {
+        let frame = FrameBuffer::default().encode_any(SCANNER, self.sequence, message).bytes().to_vec();
+        self.sequence = self.sequence.wrapping_add(1);
+        self.sent.push(frame.clone());
+        self.unsent.push_back(frame);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gimbals::mavlink_v2::sim::{Device, DeviceSettings};
+    use crate::sim::peer::Peer;
+    use crate::sim::vehicle::{Vehicle, VehicleSettings};
+    use crate::wire::DatagramFrames;
+    use crate::wire::dialect::COMMAND_LONG_DATA;
+    use crate::wire::ids::command;
+
+    /// Runs a conversation with `peer` to its end: when that was, who was there, and what was sent when.
+    fn run(mut peer: impl Peer) -> (Timestamp, BTreeMap<MavId, Party>, Vec<(Timestamp, Vec<u8>)>) {
+        let mut now = Timestamp::ZERO;
+        let mut conversation = Conversation::new(now, 115_200);
+        let mut sent = Vec::new();
+        loop {
+            peer.handle_timeout(now);
+            conversation.handle_timeout(now);
+            loop {
+                let (asked, answered) = (conversation.poll_output(), peer.poll_output());
+                if asked.is_none() && answered.is_none() {
+                    break;
+                }
+                if let Some(bytes) = asked {
+                    peer.handle_received(now, &bytes);
+                    sent.push((now, bytes));
+                }
+                if let Some(bytes) = answered {
+                    conversation.handle_received(now, &bytes);
+                }
+            }
+            if conversation.is_over(now) {
+                return (now, conversation.into_parties(), sent);
+            }
+            let next =
+                peer.poll_timeout().map_or(conversation.poll_timeout(), |at| at.min(conversation.poll_timeout()));
+            now = next.max(now);
+        }
+    }
+
+    /// Says nothing.
+    struct Nobody;
+
+    impl Peer for Nobody {
+        fn handle_received(&mut self, _now: Timestamp, _bytes: &[u8]) {}
+        fn handle_timeout(&mut self, _now: Timestamp) {}
+        fn poll_output(&mut self) -> Option<Vec<u8>> {
+            None
+        }
+        fn poll_timeout(&self) -> Option<Timestamp> {
+            None
+        }
+        fn handle_reboot(&mut self, _now: Timestamp) {}
+    }
+
+    /// Gives back everything, as a login prompt does.
+    #[derive(Default)]
+    struct Echo(VecDeque<Vec<u8>>);
+
+    impl Peer for Echo {
+        fn handle_received(&mut self, _now: Timestamp, bytes: &[u8]) {
+            self.0.push_back(bytes.to_vec());
+        }
+        fn handle_timeout(&mut self, _now: Timestamp) {}
+        fn poll_output(&mut self) -> Option<Vec<u8>> {
+            self.0.pop_front()
+        }
+        fn poll_timeout(&self) -> Option<Timestamp> {
+            None
+        }
+        fn handle_reboot(&mut self, _now: Timestamp) {}
+    }
+
+    fn ids(sent: &[(Timestamp, Vec<u8>)]) -> Vec<u32> {
+        let id = |bytes: &[u8]| DatagramFrames::new(bytes).next_frame().expect("whole frames").message_id();
+        sent.iter().map(|(_, bytes)| id(bytes)).collect()
+    }
+
+    /// A gimbal may be silent until it hears a heartbeat.
+    #[test]
+    fn a_gimbal_that_listens_first_is_found() {
+        let settings = DeviceSettings { listens_first: None, ..DeviceSettings::default() };
+        let (end, parties, _) = run(Device::new(Timestamp::ZERO, settings));
+
+        let party = &parties[&MavId::new(1, component::GIMBAL)];
+        assert!(party.is_gimbal_device && !party.is_autopilot());
+        assert_eq!(party.identity.as_ref().map(|identity| identity.model.as_str()), Some("Simulated v2"));
+        assert_eq!(parties.len(), 1);
+        assert!(end < Timestamp::ZERO + SILENCE, "{end:?}");
+    }
+
+    #[test]
+    fn an_autopilot_is_no_gimbal() {
+        let (end, parties, _) = run(Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
+
+        let party = &parties[&MavId::new(1, component::AUTOPILOT1)];
+        assert!(party.is_autopilot() && !party.is_gimbal_device);
+        assert!(end <= Timestamp::ZERO + SILENCE + INTRODUCTION);
+    }
+
+    /// "about 2.5 s silence".
+    #[test]
+    fn silence_ends_it_and_only_heartbeats_were_sent() {
+        let (end, parties, sent) = run(Nobody);
+
+        assert_eq!((end, parties), (Timestamp::ZERO + SILENCE, BTreeMap::new()));
+        assert_eq!(ids(&sent), [message::HEARTBEAT; 3]);
+    }
+
+    #[test]
+    fn our_own_echo_is_nobody() {
+        let (end, parties, sent) = run(Echo::default());
+
+        assert_eq!((end, parties), (Timestamp::ZERO + SILENCE, BTreeMap::new()));
+        assert_eq!(ids(&sent), [message::HEARTBEAT; 3]);
+    }
+
+    /// "Nothing that moves anything is ever sent."
+    #[test]
+    fn a_gimbal_is_asked_what_it_is_and_nothing_else() {
+        let (_, _, sent) = run(Device::new(Timestamp::ZERO, DeviceSettings::default()));
+        let mut requests = 0;
+        for (_, bytes) in &sent {
+            let frame = DatagramFrames::new(bytes).next_frame().expect("whole frames");
+            assert_eq!(frame.source(), SCANNER);
+            if let Some(request) = frame.decode::<COMMAND_LONG_DATA>() {
+                assert_eq!((request.command, request.param1), (command::REQUEST_MESSAGE, 283.0));
+                assert_eq!((request.target_system, request.target_component), (0, 0));
+                requests += 1;
+            } else {
+                let heartbeat: HEARTBEAT_DATA = frame.decode().expect("a heartbeat or a request");
+                assert_eq!((heartbeat.mavtype, heartbeat.autopilot, heartbeat.base_mode), (18, 8, 0));
+            }
+        }
+        assert!(requests > 0);
+    }
+
+    /// A checksum of 16 bits is right by chance now and then.
+    #[test]
+    fn one_frame_that_is_no_heartbeat_is_not_an_answer() {
+        let mut conversation = Conversation::new(Timestamp::ZERO, 57_600);
+        let request = packet::request_message(Target::Everyone, 1);
+        let chance = FrameBuffer::default().encode_any(MavId::new(77, 99), 0, &request).bytes().to_vec();
+        conversation.handle_received(Timestamp::ZERO, &chance);
+        assert_eq!(conversation.into_parties(), BTreeMap::new());
+    }
+}
