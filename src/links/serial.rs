@@ -5,7 +5,6 @@ use std::task::{Context, Poll};
 use std::time::Duration;
 
 use tokio::io::unix::AsyncFd;
-use tokio::runtime;
 use tokio_serial::{ClearBuffer, SerialPort, SerialStream};
 
 use super::backoff::Backoff;
@@ -13,7 +12,7 @@ use super::frame_queue::FrameQueue;
 use super::inbox::{Inbox, PeerIndex, PeerSet};
 use super::input_ready::watch_input;
 use super::send_failures::SendFailures;
-use super::{Link, Progress, cause};
+use super::{Link, Progress, cause, serial_port};
 use crate::timestamp::Timestamp;
 
 const PEER: PeerIndex = 0;
@@ -79,7 +78,7 @@ impl SerialLink {
 
 impl Port {
     fn open(path: &str, baud: u32) -> io::Result<Self> {
-        let device = open_apart(path, baud)?;
+        let device = serial_port::open(path, baud)?;
         // What came in while nobody listened is stale.
         device.clear(ClearBuffer::Input)?;
         Ok(Self { device: watch_input(device)?, output: FrameQueue::new(OUTPUT_LIMIT), retry_at: None, failure: None })
@@ -128,21 +127,6 @@ impl Port {
             failures.note(PEER, self.output.drop_unbegun(), "the line takes nothing");
         }
     }
-}
-
-/// Opens a port for itself alone (`TIOCEXCL` and a lock) and without blocking.
-///
-/// A stream of tokio-serial lets its runtime watch for room for output too. It is given one that never runs, so that
-/// only the input is left to watch; `docs/decisions/serial-port.md` has the figures.
-fn open_apart(path: &str, baud: u32) -> io::Result<SerialStream> {
-    let idle = runtime::Builder::new_current_thread().enable_io().build()?;
-    let device = {
-        let _entered = idle.enter();
-        SerialStream::open(&tokio_serial::new(path, baud))
-    };
-    // Has nothing to wait for, and waiting is not allowed inside the event loop.
-    idle.shutdown_background();
-    Ok(device?)
 }
 
 impl Drop for Port {
