@@ -6,6 +6,7 @@ mod configuration;
 mod conformance;
 mod daemon;
 mod daemon_pacing;
+mod demo;
 mod dialect_oracle;
 mod gimbald;
 mod pacing;
