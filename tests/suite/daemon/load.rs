@@ -234,7 +234,7 @@ impl Relayed {
     }
 
     /// The delays of all frames, in their order.
-    fn end(mut self) -> Vec<Duration> {
+    fn end(self) -> Vec<Duration> {
         for heard in self.ground.hear_for(Duration::from_millis(200)) {
             assert!(heard.decode::<HEARTBEAT_DATA>().is_some() || heard.source == AUTOPILOT || heard.source == MANAGER);
         }
