@@ -176,11 +176,7 @@ mod tests {
     use crate::wire::dialect::COMMAND_LONG_DATA;
     use crate::wire::ids::command;
 
-<<<<<<< HEAD
     /// Frames with the time when they were sent.
-=======
-    /// When which bytes were sent.
->>>>>>> serial
     type Sent = Vec<(Timestamp, Vec<u8>)>;
 
     /// Runs a conversation with `peer` to its end: when that was, who was there, and what was sent when.
