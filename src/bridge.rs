@@ -95,8 +95,8 @@ pub struct Bridge {
     vehicle: Vehicle,
     /// The autopilot of our system, once it was heard.
     autopilot: Option<MavId>,
-    /// Systems in which an autopilot was heard.
-    vehicles: Vec<bool>,
+    /// By system, the component that beats as its autopilot.
+    vehicles: Vec<Option<u8>>,
     roster: Roster,
     streams: AutopilotStreams,
     conflicts: Conflicts,
@@ -122,7 +122,7 @@ impl Bridge {
             router: Router::default(),
             vehicle: Vehicle::new(),
             autopilot: None,
-            vehicles: vec![false; 256],
+            vehicles: vec![None; 256],
             roster: Roster::new(&settings),
             streams: AutopilotStreams::default(),
             conflicts: Conflicts::default(),
@@ -220,9 +220,7 @@ impl Bridge {
         }
         self.router.close_channel(channel);
         self.router.open_channel(channel);
-        for gimbal in self.roster.iter_mut() {
-            gimbal.manager.open_channel(now, channel);
-        }
+        self.roster.open_channel(now, channel);
         // A gimbal takes the system id of the first heartbeat it hears, so ours is the first there.
         if self.channels.role(channel) == Some(Role::Gimbal) && self.identity.system().is_some() {
             self.beat(now, channel.into());
@@ -232,9 +230,7 @@ impl Bridge {
     fn close_channel(&mut self, channel: ChannelId) {
         self.channels.close(channel);
         self.router.close_channel(channel);
-        for gimbal in self.roster.iter_mut() {
-            gimbal.manager.close_channel(channel);
-        }
+        self.roster.close_channel(channel);
     }
 
     fn handle_received(&mut self, now: Timestamp, channel: ChannelId, bytes: &[u8]) {
@@ -294,14 +290,27 @@ impl Bridge {
                 gimbal.manager.forget_system(now, before, around);
             }
         }
-        self.autopilot = self.autopilot.filter(|autopilot| Some(autopilot.system) == system);
+        self.autopilot = None;
+        self.vehicle = Vehicle::new();
+        if let Some(system) = system
+            && let Some(component) = self.vehicles[usize::from(system)]
+        {
+            self.take_autopilot(now, MavId::new(system, component));
+        }
         if let Some(system) = system
             && !self.identity.is_bootstrap()
         {
             self.outbox.push_system_id(system);
         }
-        // Our first frame under a new id is a heartbeat, everywhere.
-        self.timers.set(Timer::Heartbeat, now);
+        // Our first frame under a new id is a heartbeat, everywhere, and before the frame that settled it goes on: a
+        // gimbal takes the system id of the first heartbeat it hears.
+        self.handle_heartbeat_timer(now);
+    }
+
+    fn take_autopilot(&mut self, now: Timestamp, autopilot: MavId) {
+        tracing::info!(%autopilot, "autopilot found");
+        self.autopilot = Some(autopilot);
+        self.streams.handle_autopilot_found(now);
     }
 
     fn handle_heartbeat_timer(&mut self, now: Timestamp) {

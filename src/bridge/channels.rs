@@ -219,7 +219,7 @@ impl Channels {
         }
     }
 
-    /// Takes the channels out of `wanted` whose link has had its share of this message; they are counted.
+    /// R19: takes the channels out of `wanted` whose link has had its share of this message; they are counted.
     pub fn limit_rate(&mut self, now: Timestamp, wanted: ChannelSet, frame: &Frame<'_>) -> ChannelSet {
         let mut admitted = wanted;
         for channel in wanted.intersection(self.limited) {
@@ -233,7 +233,7 @@ impl Channels {
         admitted
     }
 
-    /// Gives `frame` out on `wanted`: at once where the line is not paced, else when it is its turn.
+    /// R12: gives `frame` out on `wanted` byte for byte: at once where the line is not paced, else when it is its turn.
     pub fn transmit(&mut self, now: Timestamp, wanted: ChannelSet, frame: &Frame<'_>, outbox: &mut Outbox) {
         let paced = wanted.intersection(self.paced);
         let direct = wanted.without(self.paced).intersection(self.open);

@@ -24,12 +24,14 @@ impl Bridge {
         };
         let ours = self.is_own_id(source);
         if ours {
+            // R13: what we sent ourselves and came back is dropped; what another sends under our name is forwarded.
             if self.sent.contains(frame.bytes()) {
                 self.count_dropped(link, "loop");
                 return;
             }
             self.conflicts.note(now, Conflict::OwnIdInUse { id: source });
         } else if frame.is_known() {
+            // R8, and R6: a message that is not known could not be checked, so nothing is learned from it.
             self.router.learn(now, from, source);
         }
         match frame.message_id() {
@@ -65,21 +67,26 @@ impl Bridge {
         if !is_autopilot || source.system == 0 {
             return;
         }
-        self.vehicles[usize::from(source.system)] = true;
+        let known = &mut self.vehicles[usize::from(source.system)];
+        if known.is_none() || source.component == component::AUTOPILOT1 {
+            *known = Some(source.component);
+        }
         if role == Role::Autopilot {
             self.identity.handle_autopilot(now, source.system);
         }
         self.settle_identity(now);
-        if Some(source.system) == self.identity.system() {
-            let better = source.component == component::AUTOPILOT1;
-            let known = self.autopilot.filter(|known| known.system == source.system);
-            if known.is_none() || (better && known != Some(source)) {
-                tracing::info!(autopilot = %source, "autopilot found");
-                self.autopilot = Some(source);
-                self.streams.handle_autopilot_found(now);
-            } else if !self.vehicle.alive(now) {
-                self.streams.handle_autopilot_found(now);
+        let Some(system) = self.identity.system() else { return };
+        if source.system != system {
+            if role == Role::Autopilot && self.identity.is_fixed() {
+                self.conflicts.note(now, Conflict::AutopilotElsewhere { autopilot: source, system });
             }
+            return;
+        }
+        let better = source.component == component::AUTOPILOT1 && self.autopilot != Some(source);
+        if self.autopilot.is_none() || better {
+            self.take_autopilot(now, source);
+        } else if !self.vehicle.alive(now) {
+            self.streams.handle_autopilot_found(now);
         }
     }
 
@@ -141,7 +148,7 @@ impl Bridge {
         }
         let Some(request) = read_request(frame) else { return };
         let sender = Sender { id: frame.source(), channel: from };
-        let other_vehicle = sender.id.system != system && self.vehicles[usize::from(sender.id.system)];
+        let other_vehicle = sender.id.system != system && self.vehicles[usize::from(sender.id.system)].is_some();
         let around = Surroundings { vehicle: &self.vehicle, autopilot: self.autopilot, overheard, other_vehicle };
         for gimbal in self.roster.iter_mut().filter(|gimbal| for_us(gimbal.component)) {
             match &request {
@@ -171,56 +178,77 @@ impl Bridge {
     fn forward(&mut self, now: Timestamp, from: ChannelId, link: LinkIndex, frame: &Frame<'_>) {
         let verdict = self.router.route(now, from, frame.source(), frame.target());
         let mut channels = verdict.channels;
+        // R14: the state of our vehicle is for every gimbal, also for one that was not heard yet.
         if self.is_state_for_gimbals(frame) {
             let known = self.router.routes().component_channels(frame.source());
             channels = channels.union(self.channels.with_role(Role::Gimbal).without(from.into()).without(known));
         }
         channels = self.firewall(now, link, frame, channels);
         if matches!(frame.message_id(), message::RADIO_STATUS | message::RADIO) {
-            // An autopilot would throttle the wrong channel by it.
-            channels = channels.without(self.channels.with_role(Role::Autopilot));
+            // R17: an autopilot would throttle the wrong channel by it.
+            let autopilots = channels.intersection(self.channels.with_role(Role::Autopilot));
+            channels = self.drop_towards(channels, autopilots, "not_for_autopilot");
         }
         let gimbals = channels.intersection(self.channels.with_role(Role::Gimbal));
-        if !gimbals.is_empty() && !self.may_pass_to_gimbals(frame) {
-            for channel in gimbals {
-                self.count_dropped_towards(channel, "not_for_gimbal");
-            }
-            channels = channels.without(gimbals);
+        if !gimbals.is_empty() {
+            let barred = gimbals.without(self.passing_to_gimbals(frame, gimbals));
+            channels = self.drop_towards(channels, barred, "not_for_gimbal");
         }
         channels = self.channels.limit_rate(now, channels, frame);
         self.channels.transmit(now, channels, frame, &mut self.outbox);
     }
 
-    /// `AUTOPILOT_STATE_FOR_GIMBAL_DEVICE` of our vehicle is for every gimbal, also for one that was not heard yet.
+    /// Takes `dropped` out of `channels` and counts it there.
+    fn drop_towards(&mut self, channels: ChannelSet, dropped: ChannelSet, reason: &'static str) -> ChannelSet {
+        for channel in dropped {
+            self.count_dropped_towards(channel, reason);
+        }
+        channels.without(dropped)
+    }
+
     fn is_state_for_gimbals(&self, frame: &Frame<'_>) -> bool {
         frame.message_id() == message::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE
             && self.autopilot == Some(frame.source())
             && !matches!(frame.target(), Target::Component(_))
     }
 
-    /// What a link of role `gimbal` gets besides what is addressed to a component known there.
-    fn may_pass_to_gimbals(&self, frame: &Frame<'_>) -> bool {
-        // Until our system id is settled nothing does: a gimbal takes the id of the first heartbeat it hears.
+    /// R18: which of `gimbals`, all of that role, get the frame: what is addressed to a component known there, and
+    /// the little that a gimbal uses of what is said to all.
+    fn passing_to_gimbals(&self, frame: &Frame<'_>, gimbals: ChannelSet) -> ChannelSet {
+        // Until our system id is settled nothing passes: a gimbal takes the id of the first heartbeat it hears.
         if self.identity.system().is_none() {
-            return false;
+            return ChannelSet::EMPTY;
         }
-        match frame.target() {
-            Target::Component(_) => true,
-            Target::Everyone | Target::System(_) => matches!(
-                frame.message_id(),
-                message::HEARTBEAT
-                    | message::SYSTEM_TIME
-                    | message::TIMESYNC
-                    | message::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE
-                    | message::COMMAND_LONG
-                    | message::COMMAND_INT
-                    | message::COMMAND_ACK
-                    | message::COMMAND_CANCEL
-                    | message::PARAM_REQUEST_READ
-                    | message::PARAM_REQUEST_LIST
-                    | message::PARAM_SET
-            ),
+        if let Target::Component(target) = frame.target() {
+            return gimbals.intersection(self.router.routes().component_channels(target));
         }
+        match frame.message_id() {
+            message::HEARTBEAT
+            | message::SYSTEM_TIME
+            | message::TIMESYNC
+            | message::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE
+            | message::COMMAND_LONG
+            | message::COMMAND_INT
+            | message::COMMAND_ACK
+            | message::COMMAND_CANCEL
+            | message::PARAM_REQUEST_READ
+            | message::PARAM_REQUEST_LIST
+            | message::PARAM_SET
+            | message::PARAM_EXT_REQUEST_READ
+            | message::PARAM_EXT_REQUEST_LIST
+            | message::PARAM_EXT_SET => gimbals,
+            // The firewall keeps it away, or is told to let it pass.
+            message::GIMBAL_DEVICE_SET_ATTITUDE => gimbals.intersection(self.channels_of_devices(frame.target())),
+            _ => ChannelSet::EMPTY,
+        }
+    }
+
+    /// Where the managed devices are that `target` includes.
+    fn channels_of_devices(&self, target: Target) -> ChannelSet {
+        let devices = self.roster.iter().filter_map(|gimbal| gimbal.manager.device());
+        devices
+            .filter(|device| target.includes(*device))
+            .fold(ChannelSet::EMPTY, |channels, device| channels.union(self.router.routes().component_channels(device)))
     }
 
     /// Keeps from managed devices what others send straight to them, and on its link what a device sends as a manager.
@@ -228,6 +256,7 @@ impl Bridge {
         let source = frame.source();
         match frame.message_id() {
             message::GIMBAL_MANAGER_INFORMATION | message::GIMBAL_MANAGER_STATUS => {
+                // R16: clients would see a second manager of the same gimbal.
                 if self.roster.is_device(source) {
                     self.conflicts.note(now, Conflict::DeviceActsAsManager { device: source });
                     self.count_dropped(link, "device_manager_message");
@@ -244,22 +273,20 @@ impl Bridge {
         channels
     }
 
+    /// R15: on our gimbals we are the only party that says where to look.
     fn keep_from_devices(&mut self, now: Timestamp, frame: &Frame<'_>, channels: ChannelSet) -> ChannelSet {
         let kept_away = self.settings.control.firewall == Firewall::On;
-        let mut passed = channels;
-        let devices: Vec<MavId> = self.roster.iter().filter_map(|gimbal| gimbal.manager.device()).collect();
-        for device in devices.into_iter().filter(|device| frame.target().includes(*device)) {
-            let rival = frame.source();
-            let autopilot = self.autopilot.filter(|known| *known == rival).and(self.vehicle.autopilot());
+        let rival = frame.source();
+        let autopilot = self.autopilot.filter(|known| *known == rival).and(self.vehicle.autopilot());
+        let devices = self.roster.iter().filter_map(|gimbal| gimbal.manager.device());
+        for device in devices.filter(|device| frame.target().includes(*device)) {
             self.conflicts.note(now, Conflict::RivalMaster { rival, device, autopilot, kept_away });
-            if kept_away {
-                for channel in passed.intersection(self.router.routes().component_channels(device)) {
-                    self.count_dropped_towards(channel, "firewall");
-                    passed.remove(channel);
-                }
-            }
         }
-        passed
+        if !kept_away {
+            return channels;
+        }
+        let guarded = channels.intersection(self.channels_of_devices(frame.target()));
+        self.drop_towards(channels, guarded, "firewall")
     }
 
     fn note_rival_manager(&mut self, now: Timestamp, frame: &Frame<'_>) {

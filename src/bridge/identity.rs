@@ -43,6 +43,11 @@ impl Identity {
         self.system
     }
 
+    /// Whether the configuration names the id.
+    pub fn is_fixed(&self) -> bool {
+        self.fixed
+    }
+
     /// Whether we run on the fallback id.
     pub fn is_bootstrap(&self) -> bool {
         self.bootstrap

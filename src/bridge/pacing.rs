@@ -1,4 +1,4 @@
-//! The output of a serial line: whole frames at the speed of the wire, control first, nothing stale.
+//! R20: the output of a serial line: whole frames at the speed of the wire, control first, nothing stale.
 //!
 //! The kernel's buffer would hold a second of frames that nobody can recall. So a frame is given out only when the one
 //! before it has left the wire, and waits here until then, where a newer setpoint can take its place.
@@ -72,8 +72,15 @@ pub const MAX_BROADCAST_AGE: Duration = Duration::from_millis(300);
 /// What is addressed to somebody waits at most so long: its sender repeats it after about that time.
 pub const MAX_ADDRESSED_AGE: Duration = Duration::from_millis(1_000);
 
+/// A command that is older was given up by its sender, or sent again.
+pub const MAX_CONTROL_AGE: Duration = Duration::from_millis(2_000);
+
 const SLOTS: usize = 128;
-const MAX_PER_PRIORITY: usize = 42;
+
+/// So many frames of each priority wait at most; control may take the room of the others.
+const MAX_WAITING: [usize; 3] = [SLOTS, 42, 42];
+
+const MAX_AGES: [Duration; 3] = [MAX_CONTROL_AGE, MAX_ADDRESSED_AGE, MAX_BROADCAST_AGE];
 
 /// A frame may be given out this much before the wire is free, so that a late wake-up leaves no gap on it.
 const LEAD: Duration = Duration::from_micros(800);
@@ -124,13 +131,13 @@ impl SerialQueue {
             self.fill(slot, now, frame, key);
             return;
         }
-        if self.waiting[queue].len() >= MAX_PER_PRIORITY
-            && let Some(oldest) = self.waiting[queue].pop_front()
-        {
-            self.count(QUEUE_FULL);
-            self.free.push(oldest);
+        if self.waiting[queue].len() >= MAX_WAITING[queue] {
+            self.drop_oldest(queue);
+        } else if self.free.is_empty() {
+            let least_urgent = self.waiting.iter().rposition(|queue| !queue.is_empty());
+            self.drop_oldest(least_urgent.expect("the slots that are not free wait in some queue"));
         }
-        let slot = self.free.pop().expect("three queues of 42 leave two of 128 slots free");
+        let slot = self.free.pop().expect("one was free or has just become so");
         self.fill(slot, now, frame, key);
         self.waiting[queue].push_back(slot);
     }
@@ -171,10 +178,9 @@ impl SerialQueue {
     }
 
     fn next_fresh(&mut self, now: Timestamp) -> Option<u8> {
-        for (queue, max_age) in [(0, None), (1, Some(MAX_ADDRESSED_AGE)), (2, Some(MAX_BROADCAST_AGE))] {
+        for (queue, max_age) in MAX_AGES.into_iter().enumerate() {
             while let Some(slot) = self.waiting[queue].pop_front() {
-                let age = now.since(self.slots[usize::from(slot)].queued_at);
-                if max_age.is_none_or(|max_age| age <= max_age) {
+                if now.since(self.slots[usize::from(slot)].queued_at) <= max_age {
                     return Some(slot);
                 }
                 self.count(STALE);
@@ -182,6 +188,13 @@ impl SerialQueue {
             }
         }
         None
+    }
+
+    fn drop_oldest(&mut self, queue: usize) {
+        if let Some(oldest) = self.waiting[queue].pop_front() {
+            self.count(QUEUE_FULL);
+            self.free.push(oldest);
+        }
     }
 
     fn fill(&mut self, slot: u8, now: Timestamp, frame: &Frame<'_>, key: Option<ReplaceKey>) {
@@ -266,15 +279,37 @@ mod tests {
         assert_eq!(queue.dropped(), &BTreeMap::from([(LINK_DOWN, 1)]));
     }
 
+    /// "When a link's output queue is full, stream frames are dropped before COMMAND_*" (Protocol checklist 155).
     #[test]
-    fn a_flood_is_bounded_and_the_newest_frames_stay() {
-        let mut queue = SerialQueue::new(57_600);
+    fn a_full_queue_drops_telemetry_before_control_and_the_oldest_first() {
+        let mut queue = SerialQueue::new(921_600);
         for n in 0..100 {
             push(&mut queue, Timestamp::ZERO, &attitude(n));
             push(&mut queue, Timestamp::ZERO, &ack(n));
         }
-        assert_eq!(queue.dropped(), &BTreeMap::from([(QUEUE_FULL, 2 * (100 - 42))]));
-        assert_eq!(queue.pop(Timestamp::ZERO), Some(&ack(58)[..]));
+        assert_eq!(queue.dropped(), &BTreeMap::from([(QUEUE_FULL, 200 - SLOTS as u64)]));
+        let sent = drain(&mut queue);
+        let expected = (0..100).map(ack).chain((72..100).map(attitude));
+        assert_eq!(sent, expected.collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn a_flood_of_control_is_bounded_and_the_newest_frames_stay() {
+        let mut queue = SerialQueue::new(57_600);
+        for n in 0..200 {
+            push(&mut queue, Timestamp::ZERO, &ack(n));
+        }
+        assert_eq!(queue.dropped(), &BTreeMap::from([(QUEUE_FULL, 200 - SLOTS as u64)]));
+        assert_eq!(drain(&mut queue), (72..200).map(ack).collect::<Vec<_>>());
+    }
+
+    /// Everything that waits, at the pace of the line.
+    fn drain(queue: &mut SerialQueue) -> Vec<Vec<u8>> {
+        let mut sent = Vec::new();
+        while let Some(at) = queue.poll_timeout() {
+            sent.extend(queue.pop(at).map(<[u8]>::to_vec));
+        }
+        sent
     }
 
     fn push(queue: &mut SerialQueue, now: Timestamp, bytes: &[u8]) {

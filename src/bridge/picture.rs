@@ -110,6 +110,7 @@ impl Bridge {
         let failures = manager.status().map_or(FailureFlags::empty(), |(_, status)| status.failures);
         GimbalSnapshot {
             name: manager.settings().name.clone(),
+            configured: gimbal.configured,
             family: "mavlink_v2".to_owned(),
             manager_component_id: gimbal.component,
             device_id: manager.device_id(),

@@ -5,6 +5,7 @@
 
 use super::LinkIndex;
 use super::settings::Settings;
+use crate::channel::{ChannelId, ChannelSet};
 use crate::gimbals::mavlink_v2::MavlinkV2Driver;
 use crate::gimbals::settings::GimbalSettings;
 use crate::gimbals::{DriverOutput, GimbalDriver};
@@ -19,6 +20,8 @@ use crate::wire::ids::component;
 pub struct Gimbal {
     pub manager: GimbalManager,
     pub driver: Box<dyn GimbalDriver>,
+    /// The component that the driver talks to, from the first sign of it on.
+    pub adopted: Option<MavId>,
     /// The manager's component id.
     pub component: u8,
     /// It has an entry in the configuration, and is missed when it is not there.
@@ -30,6 +33,7 @@ impl Gimbal {
         Self {
             manager: GimbalManager::new(settings, rules.clone()),
             driver: Box::new(MavlinkV2Driver::new()),
+            adopted: None,
             component,
             configured,
         }
@@ -64,6 +68,8 @@ pub enum GimbalOutput {
 pub struct Roster {
     gimbals: Vec<Gimbal>,
     rules: ControlSettings,
+    /// The channels that are open, for the manager of a gimbal that is found later.
+    open: ChannelSet,
 }
 
 /// No component id is left for the manager of another gimbal.
@@ -72,7 +78,7 @@ pub struct NoManagerLeft;
 
 impl Roster {
     pub fn new(settings: &Settings) -> Self {
-        let mut roster = Self { gimbals: Vec::new(), rules: settings.control.clone() };
+        let mut roster = Self { gimbals: Vec::new(), rules: settings.control.clone(), open: ChannelSet::EMPTY };
         let mut wanted: Vec<Option<u8>> = settings
             .gimbals
             .iter()
@@ -108,14 +114,29 @@ impl Roster {
         &mut self.gimbals[at]
     }
 
+    /// Every manager tells of its gimbal on `channel` from now on.
+    pub fn open_channel(&mut self, now: Timestamp, channel: ChannelId) {
+        self.open.insert(channel);
+        for gimbal in &mut self.gimbals {
+            gimbal.manager.open_channel(now, channel);
+        }
+    }
+
+    pub fn close_channel(&mut self, channel: ChannelId) {
+        self.open.remove(channel);
+        for gimbal in &mut self.gimbals {
+            gimbal.manager.close_channel(channel);
+        }
+    }
+
     /// The gimbal whose device that is.
     pub fn of_device(&mut self, device: MavId) -> Option<&mut Gimbal> {
-        self.gimbals.iter_mut().find(|gimbal| gimbal.manager.device() == Some(device))
+        self.gimbals.iter_mut().find(|gimbal| gimbal.adopted == Some(device))
     }
 
     /// Whether `id` is a managed device.
     pub fn is_device(&self, id: MavId) -> bool {
-        self.gimbals.iter().any(|gimbal| gimbal.manager.device() == Some(id))
+        self.gimbals.iter().any(|gimbal| gimbal.adopted == Some(id))
     }
 
     /// Whether `component` is one of our managers.
@@ -130,18 +151,23 @@ impl Roster {
             None => {
                 let component = self.free_manager(device).ok_or(NoManagerLeft)?;
                 let settings = GimbalSettings::found(format!("gimbal-{}", device.component));
-                self.gimbals.push(Gimbal::new(settings, &self.rules, component, false));
+                let mut gimbal = Gimbal::new(settings, &self.rules, component, false);
+                for channel in self.open {
+                    gimbal.manager.open_channel(now, channel);
+                }
+                self.gimbals.push(gimbal);
                 self.gimbals.len() - 1
             }
         };
         self.gimbals[at].driver.adopt(now, device);
+        self.gimbals[at].adopted = Some(device);
         Ok(&mut self.gimbals[at])
     }
 
     fn place_for(&self, device: MavId, link: LinkIndex) -> Option<usize> {
         let fits = |gimbal: &Gimbal| {
             let settings = gimbal.manager.settings();
-            let free = gimbal.manager.device().is_none()
+            let free = gimbal.adopted.is_none()
                 || (gimbal.manager.state() == DeviceState::Lost && settings.component_id == Some(device.component));
             free && settings.link.is_none_or(|wanted| wanted == link)
         };

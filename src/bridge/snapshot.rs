@@ -70,6 +70,8 @@ pub struct VehicleSnapshot {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GimbalSnapshot {
     pub name: String,
+    /// It has an entry in the configuration, and is missed when it is not there.
+    pub configured: bool,
     pub family: String,
     pub manager_component_id: u8,
     pub device_id: Option<u8>,

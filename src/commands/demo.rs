@@ -109,8 +109,8 @@ gimbald demo: a simulated vehicle and gimbal, and the daemon between them
 
   Page             http://{}
   QGroundControl   start it; the vehicle appears by itself ({})
-  MAVSDK           connection udpout://{CLIENT} (before version 2: udp://{CLIENT} as a client)
-  MAVProxy         mavproxy.py --master=udpout:{CLIENT}
+  MAVSDK           connection udpout://{CLIENT}
+  MAVProxy         mavproxy.py --master=udpout:{CLIENT}, then: module load camera; camera set manager_component 191
 
   Links
 {}

@@ -92,13 +92,14 @@ impl EventLoop {
             self.service_manager.stopping();
             self.input(now, Input::Shutdown);
         }
-        if self.core.poll_timeout().is_some_and(|at| now >= at) {
-            self.core.handle_timeout(now);
-            self.ports.carry_out(&mut self.core);
-        }
         let mut more = false;
         for link in 0..self.ports.links.len() {
             more |= self.poll_link(now, link, cx);
+        }
+        // Last, so that what an input made due at once leaves with the same wake-up.
+        if self.core.poll_timeout().is_some_and(|at| now >= at) {
+            self.core.handle_timeout(now);
+            self.ports.carry_out(&mut self.core);
         }
         for link in &mut self.ports.links {
             link.flush(now);

@@ -70,6 +70,7 @@ fn gimbal_link() -> LinkSnapshot {
 fn held_gimbal() -> GimbalSnapshot {
     GimbalSnapshot {
         name: "camera".into(),
+        configured: true,
         family: "mavlink_v2".into(),
         manager_component_id: 191,
         device_id: Some(154),
@@ -106,6 +107,7 @@ fn held_gimbal() -> GimbalSnapshot {
 fn searched_gimbal() -> GimbalSnapshot {
     GimbalSnapshot {
         name: "lamp".into(),
+        configured: true,
         family: "auto".into(),
         manager_component_id: 192,
         state: "searching".into(),

@@ -13,13 +13,13 @@ pub struct Readiness {
 }
 
 impl Readiness {
-    /// Ready when every link is up and every gimbal is alive.
+    /// Ready when every link is up and every configured gimbal is alive; one that was only found may go away again.
     pub fn of(snapshot: &Snapshot) -> Self {
         let links = snapshot.links.iter().filter(|link| link.state != "up").map(|link| match &link.reason {
             Some(reason) => format!("link {} is {}: {reason}", link.name, link.state),
             None => format!("link {} is {}", link.name, link.state),
         });
-        let gimbals = snapshot.gimbals.iter().filter(|gimbal| gimbal.state != "alive");
+        let gimbals = snapshot.gimbals.iter().filter(|gimbal| gimbal.configured && gimbal.state != "alive");
         let gimbals = gimbals.map(|gimbal| format!("gimbal {} is {}", gimbal.name, gimbal.state));
         Self::for_reasons(links.chain(gimbals).collect())
     }
@@ -45,7 +45,7 @@ mod tests {
     }
 
     fn gimbal(name: &str, state: &str) -> GimbalSnapshot {
-        GimbalSnapshot { name: name.into(), state: state.into(), ..GimbalSnapshot::default() }
+        GimbalSnapshot { name: name.into(), configured: true, state: state.into(), ..GimbalSnapshot::default() }
     }
 
     /// "200 when every configured link is up and every configured gimbal is alive, else 503 with the reasons".

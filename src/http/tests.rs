@@ -50,7 +50,7 @@ fn status_is_the_whole_snapshot() {
         },
         "gimbals": [
             {
-                "name": "camera", "family": "mavlink_v2", "manager_component_id": 191, "device_id": 154,
+                "name": "camera", "configured": true, "family": "mavlink_v2", "manager_component_id": 191, "device_id": 154,
                 "device": "1/154", "state": "alive", "vendor": "Acme", "model": "Pixy", "firmware": "7.8.1",
                 "attitude": {
                     "roll_deg": 0.25, "pitch_deg": -42.5, "yaw_vehicle_deg": 30.0, "yaw_earth_deg": 117.0, "age_ms": 18,
@@ -65,7 +65,7 @@ fn status_is_the_whole_snapshot() {
                 "rejected": {"1/100": {"not_in_control": 12}},
             },
             {
-                "name": "lamp", "family": "auto", "manager_component_id": 192, "device_id": null,
+                "name": "lamp", "configured": true, "family": "auto", "manager_component_id": 192, "device_id": null,
                 "device": null, "state": "searching", "vendor": null, "model": null, "firmware": null,
                 "attitude": {
                     "roll_deg": null, "pitch_deg": null, "yaw_vehicle_deg": null, "yaw_earth_deg": null, "age_ms": null,

@@ -6,13 +6,13 @@ use crate::channel::{ChannelId, ChannelSet};
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 
-/// A route not heard on for so long is forgotten.
+/// R9: a route not heard on for so long is forgotten.
 pub const ROUTE_EXPIRY: Duration = Duration::from_secs(60);
 
-/// When a component moves to another channel, its old one is kept for so long: redundant links alternate.
+/// R9: when a component moves to another channel, its old one is kept for so long: redundant links alternate.
 pub const MOVE_GRACE: Duration = Duration::from_secs(5);
 
-/// More components than any vehicle has; beyond it the longest-silent one is forgotten.
+/// R11: more components than any vehicle has; beyond it the longest-silent one is forgotten.
 const MAX_COMPONENTS: usize = 512;
 
 /// The components heard, each with the channels it was heard on.
@@ -32,8 +32,8 @@ struct Component {
     id: MavId,
     channels: ChannelSet,
     heard: Vec<(ChannelId, Timestamp)>,
-    /// `SYSTEM_TIME.time_boot_ms` as last heard.
-    boot_ms: Option<u32>,
+    /// The latest `SYSTEM_TIME.time_boot_ms` and where it was heard.
+    boot_ms: Option<(ChannelId, u32)>,
 }
 
 const NOWHERE: u16 = u16::MAX;
@@ -103,12 +103,23 @@ impl Routes {
         self.position(id).and_then(|at| self.components[at].heard.iter().map(|(_, heard)| *heard).max())
     }
 
-    /// Notes the time since boot that `id` reports. A smaller one than before means that it was restarted, and
-    /// returns true: its system's routes are to be forgotten.
-    pub fn note_boot_time(&mut self, id: MavId, boot_ms: u32) -> bool {
+    /// Notes the time since boot that `id` reports on `channel`. A smaller one than before means that it was
+    /// restarted, and returns true: its system's routes are to be forgotten.
+    ///
+    /// Redundant links lag behind each other, so a time from another channel must be smaller by [`MOVE_GRACE`].
+    pub fn note_boot_time(&mut self, channel: ChannelId, id: MavId, boot_ms: u32) -> bool {
         let Some(at) = self.position(id) else { return false };
-        let before = self.components[at].boot_ms.replace(boot_ms);
-        before.is_some_and(|before| boot_ms < before)
+        let latest = &mut self.components[at].boot_ms;
+        let Some((heard_on, before)) = *latest else {
+            *latest = Some((channel, boot_ms));
+            return false;
+        };
+        let step_back = Duration::from_millis(u64::from(before.saturating_sub(boot_ms)));
+        let lags_behind = channel != heard_on && !step_back.is_zero() && step_back <= MOVE_GRACE;
+        if !lags_behind {
+            *latest = Some((channel, boot_ms));
+        }
+        !step_back.is_zero() && !lags_behind
     }
 
     pub fn forget_system(&mut self, system: u8) {
@@ -122,7 +133,7 @@ impl Routes {
         self.rebuild();
     }
 
-    /// Forgets what was not heard for [`ROUTE_EXPIRY`].
+    /// Forgets what was not heard for a minute.
     pub fn expire(&mut self, now: Timestamp) {
         if now < self.next_expiry {
             return;
@@ -234,6 +245,27 @@ mod tests {
 
         assert_eq!(routes.component_channels(AUTOPILOT), channel(1).into());
         assert_eq!(routes.system_channels(1), channel(1).into());
+    }
+
+    /// "When a source system sends SYSTEM_TIME with smaller time_boot_ms, its routes are forgotten" (Protocol checklist
+    /// 148), but two links of one autopilot that lag behind each other do not restart it.
+    #[test]
+    fn a_smaller_boot_time_is_a_restart_unless_a_slower_link_brings_it() {
+        let mut routes = Routes::default();
+        routes.learn(Timestamp::ZERO, channel(0), AUTOPILOT);
+        routes.learn(Timestamp::ZERO, channel(1), AUTOPILOT);
+        for (on, boot_ms, restarted) in [
+            (0, 10_000, false),
+            (1, 9_900, false),
+            (0, 10_000, false),
+            (1, 5_000, false),
+            (1, 11_000, false),
+            (1, 10_999, true),
+            (0, 10_998, false),
+            (0, 5_998, true),
+        ] {
+            assert_eq!(routes.note_boot_time(channel(on), AUTOPILOT, boot_ms), restarted, "{boot_ms} on {on}");
+        }
     }
 
     #[test]

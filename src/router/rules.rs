@@ -1,4 +1,4 @@
-//! The numbered routing rules.
+//! The numbered routing rules; `docs/routing.md` has each with its source.
 
 use super::routes::Routes;
 use crate::channel::{ChannelId, ChannelSet};
@@ -22,7 +22,7 @@ pub struct Verdict {
 }
 
 impl Router {
-    /// The system id that rules R4 and R5 speak of; `None` until it is settled.
+    /// The system id that rule R5 speaks of; `None` until it is settled.
     pub fn set_own_system(&mut self, system: Option<u8>) {
         self.own_system = system;
     }
@@ -41,7 +41,7 @@ impl Router {
         self.open
     }
 
-    /// R9: a source is known where it was heard. Call for frames that were checked only.
+    /// R8: a source is known where it was heard. Call for frames that were checked only.
     pub fn learn(&mut self, now: Timestamp, channel: ChannelId, source: MavId) {
         self.routes.learn(now, channel, source);
     }
@@ -49,10 +49,10 @@ impl Router {
     /// R10: `SYSTEM_TIME` with a smaller time since boot means a restarted system; its routes are forgotten, and the
     /// source is learned anew on `channel`.
     pub fn note_boot_time(&mut self, now: Timestamp, channel: ChannelId, source: MavId, boot_ms: u32) {
-        if self.routes.note_boot_time(source, boot_ms) {
+        if self.routes.note_boot_time(channel, source, boot_ms) {
             self.routes.forget_system(source.system);
             self.routes.learn(now, channel, source);
-            self.routes.note_boot_time(source, boot_ms);
+            self.routes.note_boot_time(channel, source, boot_ms);
         }
     }
 
@@ -70,7 +70,7 @@ impl Router {
         let reachable = self.reachable(target);
         // R1: never back to where it came from.
         let onward = reachable.intersection(self.open).without(from.into());
-        // R8: never to where its source is known, or it would go round in circles.
+        // R7: never to where its source is known, or it would go round in circles.
         let known = self.routes.component_channels(source);
         Verdict { channels: onward.without(known), looped: onward.intersection(known) }
     }
@@ -83,17 +83,17 @@ impl Router {
 
     fn reachable(&self, target: Target) -> ChannelSet {
         match target {
-            // R2: no target, or target system 0, is for everybody.
+            // R2: no target, or target system 0, is for everybody. R6: so is a message that is not known.
             Target::Everyone => self.open,
-            // R3 and R5: to where the system was heard, ours like any other.
+            // R3: to where the system was heard, ours like any other.
             Target::System(system) => self.routes.system_channels(system),
             Target::Component(id) => {
                 let exact = self.routes.component_channels(id);
                 if exact.is_empty() && self.own_system != Some(id.system) {
-                    // R6: in another system an unknown component is looked for where the system is.
+                    // R5: in another system an unknown component is looked for where the system is.
                     self.routes.system_channels(id.system)
                 } else {
-                    // R4: in ours it goes to where exactly it was heard, or nowhere.
+                    // R4: to where exactly it was heard; in our system or nowhere.
                     exact
                 }
             }

@@ -72,6 +72,9 @@ pub mod message {
     pub const AUTOPILOT_STATE_FOR_GIMBAL_DEVICE: u32 = 286;
     pub const GIMBAL_MANAGER_SET_PITCHYAW: u32 = 287;
     pub const GIMBAL_MANAGER_SET_MANUAL_CONTROL: u32 = 288;
+    pub const PARAM_EXT_REQUEST_READ: u32 = 320;
+    pub const PARAM_EXT_REQUEST_LIST: u32 = 321;
+    pub const PARAM_EXT_SET: u32 = 323;
     pub const TUNNEL: u32 = 385;
     pub const COMPONENT_INFORMATION_BASIC: u32 = 396;
     pub const STORM32_GIMBAL_MANAGER_INFORMATION: u32 = 60_010;

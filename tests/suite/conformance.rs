@@ -1,3 +1,8 @@
 //! The protocol checklist, item by item; the number of an item is in the name of its test.
 
+mod autopilot_state;
 mod codec;
+mod discovery;
+mod identity;
+mod manager;
+mod mavsdk_trace;

@@ -1,12 +1,16 @@
 //! Everything that is tested from outside the crate, as one binary.
 
+mod allocations;
 mod captures;
 mod configuration;
 mod conformance;
 mod daemon;
+mod daemon_pacing;
 mod dialect_oracle;
 mod gimbald;
+mod pacing;
 mod properties;
+mod routing;
 mod shipped_files;
 mod structure;
 mod support;

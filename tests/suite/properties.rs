@@ -1,3 +1,5 @@
 //! What holds for any input.
 
+mod manager;
+mod routing;
 mod wire;

@@ -1,0 +1,89 @@
+//! D10: "284, 204, 205 and 220 from others to a managed device are not delivered and are counted (`firewall = "warn"`
+//! lets them pass); a device's own 280/281 do not leave their link".
+
+use gimbald::bridge::settings::{Settings, SystemId};
+use gimbald::manager::settings::{ControlSettings, Firewall};
+
+use super::*;
+use crate::support::world::{AUTOPILOT, GIMBAL};
+
+const SET_ATTITUDE: u32 = 284;
+
+fn rig(firewall: Firewall) -> Rig {
+    let control = ControlSettings { firewall, ..ControlSettings::default() };
+    let mut rig = Rig::with(Settings { system_id: SystemId::Fixed(1), control, ..Settings::default() });
+    rig.introduce("autopilot", AUTOPILOT);
+    rig.introduce("gimbal", GIMBAL);
+    rig
+}
+
+/// Setpoints and mount commands of an autopilot, as ArduPilot (directed) and PX4 (to 1/0 and 0/0) send them, and who
+/// gets them when nothing is kept away.
+fn steering() -> Vec<(Vec<u8>, &'static [&'static str])> {
+    let mut frames: Vec<(Vec<u8>, &'static [&'static str])> = Vec::new();
+    let all = &["gimbal", "ground", "radio", "peer"][..];
+    for (target, receivers) in [((1, 154), &["gimbal"][..]), ((1, 0), &["gimbal"]), ((0, 0), all)] {
+        frames.push((addressed(AUTOPILOT, SET_ATTITUDE, target), receivers));
+        for number in [204, 205, 220] {
+            frames.push((command(AUTOPILOT, COMMAND_LONG, number, target), receivers));
+            frames.push((command(AUTOPILOT, COMMAND_INT, number, target), receivers));
+        }
+    }
+    frames
+}
+
+/// Protocol checklist 153: "When 284 or 205 for S/154 arrives from outside and `conflict = firewall`, it is not sent to
+/// the gimbal link and is counted".
+#[test]
+fn item_153_nobody_else_steers_a_managed_gimbal() {
+    let mut rig = rig(Firewall::On);
+    for (count, (bytes, receivers)) in steering().into_iter().enumerate() {
+        let others: Vec<_> = receivers.iter().copied().filter(|name| *name != "gimbal").collect();
+        assert_eq!(rig.deliver_amid_ours("autopilot", &bytes), others, "{bytes:02x?}");
+        assert_eq!(rig.dropped("gimbal", "firewall"), count as u64 + 1);
+    }
+    let conflicts = rig.world.snapshot().conflicts;
+    assert!(conflicts.len() == 1 && conflicts[0].contains("MNT_MODE_IN"), "{conflicts:?}");
+    assert_eq!(rig.dropped("gimbal", "not_for_gimbal"), 0);
+}
+
+/// Protocol checklist 153: "with `warn` it is forwarded", however it is addressed.
+#[test]
+fn item_153_with_warn_it_is_forwarded_and_told() {
+    let mut rig = rig(Firewall::Warn);
+    for (bytes, receivers) in steering() {
+        assert_eq!(rig.deliver_amid_ours("autopilot", &bytes), receivers, "{bytes:02x?}");
+    }
+    assert_eq!(rig.world.snapshot().links[1].dropped_frames, 0);
+    let conflicts = rig.world.snapshot().conflicts;
+    assert!(conflicts.len() == 1 && conflicts[0].contains("fight with ours"), "{conflicts:?}");
+}
+
+/// The firewall is about the devices that we manage, on whatever link they are, and about nothing else.
+#[test]
+fn item_153_other_devices_and_other_commands_pass() {
+    let mut rig = rig(Firewall::On);
+    rig.introduce("peer", MavId::new(9, 154));
+    assert_eq!(rig.deliver("ground", &addressed(GROUND, SET_ATTITUDE, (9, 154))), ["peer"]);
+    assert_eq!(rig.deliver("ground", &command(GROUND, COMMAND_LONG, 205, (1, 1))), ["autopilot"]);
+    assert_eq!(rig.deliver("ground", &command(GROUND, COMMAND_LONG, 246, (1, 154))), ["gimbal"]);
+
+    rig.introduce("peer", MavId::new(1, 171));
+    assert_eq!(rig.deliver("ground", &addressed(GROUND, SET_ATTITUDE, (1, 171))), [""; 0]);
+    assert_eq!(rig.dropped("peer", "firewall"), 1);
+}
+
+/// "a device's own 280/281 do not leave their link": two managers of one gimbal would be seen.
+#[test]
+fn what_a_device_says_as_a_manager_stays_on_its_link() {
+    let mut rig = rig(Firewall::On);
+    rig.open_beside("gimbal", "second gimbal");
+    for (count, id) in [(1, 280), (2, 281)] {
+        assert_eq!(rig.deliver("gimbal", &broadcast(GIMBAL, id)), [""; 0]);
+        assert_eq!(rig.dropped("gimbal", "device_manager_message"), count);
+        // Another's are forwarded.
+        assert_eq!(rig.deliver("peer", &broadcast(MavId::new(9, 154), id)), ["autopilot", "ground", "radio"]);
+    }
+    let conflicts = rig.world.snapshot().conflicts;
+    assert!(conflicts.iter().any(|conflict| conflict.contains("280 and 281")), "{conflicts:?}");
+}
