@@ -352,8 +352,10 @@ impl Bridge {
 
     /// Which messages of the autopilot are wanted at present.
     fn look_after_streams(&mut self, now: Timestamp) {
-        if self.autopilot.is_some() && !self.vehicle.alive(now) {
-            self.streams.handle_autopilot_lost();
+        match (self.autopilot.is_some() && self.vehicle.alive(now), self.streams.has_autopilot()) {
+            (true, false) => self.streams.handle_autopilot_found(now),
+            (false, true) => self.streams.handle_autopilot_lost(),
+            _ => {}
         }
         let has_gimbal_of_ours = self.roster.iter().filter_map(|gimbal| gimbal.manager.device()).any(|device| {
             let channels = self.router.routes().component_channels(device);

@@ -68,6 +68,11 @@ impl AutopilotStreams {
         }
     }
 
+    /// Whether there is somebody to ask.
+    pub fn has_autopilot(&self) -> bool {
+        self.since.is_some()
+    }
+
     pub fn handle_autopilot_lost(&mut self) {
         self.since = None;
     }

@@ -51,9 +51,12 @@ fn every_frame_of_a_recording_is_decoded_or_counted() {
     }
 }
 
+/// A recording, and who plays the gimbal.
+type Recording = (&'static str, Gimbal);
+
 /// How each recording is played through the core, and what the autopilot is to be told to leave the gimbal to us.
 #[rustfmt::skip]
-const REPLAYS: [(&str, &[(&str, Gimbal)], &[&str]); 5] = [
+const REPLAYS: [(&str, &[Recording], &[&str]); 5] = [
     ("ap_gremsy_a", &[("gimbal", Gimbal::Simulated), ("ground", Gimbal::Recorded)], &["MNT1_TYPE", "MNT1_TYPE"]),
     ("ap_none",     &[("ground", Gimbal::Recorded)],                                &[]),
     ("ap_storm32",  &[("gimbal", Gimbal::Simulated), ("ground", Gimbal::Recorded)], &["MNT1_TYPE", "MNT1_TYPE"]),
@@ -129,7 +132,10 @@ fn assert_expected(capture: &str, part: Part, lines: &[String]) {
     let written = read();
     drop(guard);
     let written: Vec<&str> = written.lines().filter(|line| Part::of(line) == part).collect();
-    assert_eq!(written, lines, "{capture}");
+    for (written, found) in written.iter().zip(lines) {
+        assert_eq!(written, found, "{capture}");
+    }
+    assert_eq!(written.len(), lines.len(), "{capture}");
 }
 
 /// What decoding found on one link.

@@ -2,9 +2,10 @@
 
 use std::time::Duration;
 
+use gimbald::bridge::settings::{Settings, SystemId};
 use gimbald::timestamp::Timestamp;
 use gimbald::wire::MavId;
-use gimbald::wire::dialect::{AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA, COMMAND_LONG_DATA, MavMessage};
+use gimbald::wire::dialect::{ATTITUDE_DATA, AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA, COMMAND_LONG_DATA, MavMessage};
 
 use crate::support::script::{ack, autopilot_state, gimbal_heartbeat, px4_heartbeat};
 use crate::support::world::{AUTOPILOT, Arrival, GIMBAL, MANAGER, Place, Places, World, three_links};
@@ -57,6 +58,29 @@ fn item_140_a_missing_state_is_asked_for() {
     for elsewhere in [places.gimbal, places.ground] {
         assert_eq!(state_requests(&mut world, elsewhere), []);
     }
+}
+
+/// Protocol checklist 140 again, when the system id is found out first and the autopilot tells of everything but 286.
+#[test]
+fn item_140_a_missing_state_is_asked_for_once_the_system_id_is_settled() {
+    let settings = Settings { system_id: SystemId::Auto, ..three_links() };
+    let (mut world, places) = World::empty(settings);
+    let attitude = ATTITUDE_DATA {
+        time_boot_ms: 0,
+        roll: 0.0,
+        pitch: 0.0,
+        yaw: 0.0,
+        rollspeed: 0.0,
+        pitchspeed: 0.0,
+        yawspeed: 0.0,
+    };
+    let [autopilot, gimbal] = peers(places);
+    let attitude = (SECOND / 10, places.autopilot, AUTOPILOT, MavMessage::ATTITUDE(attitude));
+
+    world.run_with(Duration::from_secs(12), &[autopilot, gimbal, attitude]);
+
+    let asked = state_requests(&mut world, places.autopilot);
+    assert!(asked.first().is_some_and(|(at, _)| *at <= Timestamp::from_secs(7)), "{asked:?}");
 }
 
 /// Protocol checklist 140, the other way round: nothing is asked for while it comes, while no gimbal is there that could

@@ -29,7 +29,7 @@ const SENDERS: [MavId; 5] = [GCS, MavId::new(255, 191), MavId::new(1, 192), AUTO
 enum Step {
     Say {
         sender: usize,
-        message: MavMessage,
+        message: Box<MavMessage>,
     },
     /// A frame of the right length and checksum whose payload is anything.
     Babble {
@@ -104,7 +104,7 @@ proptest! {
         for _ in 0..repeats {
             take_step(&mut world, places, Step::Turn { heading_deg });
             take_step(&mut world, places, Step::Look { pitch_deg: 0.0, yaw_deg: 0.0, flags, failure_flags: 0 });
-            take_step(&mut world, places, Step::Say { sender: 0, message: demand.clone() });
+            take_step(&mut world, places, Step::Say { sender: 0, message: Box::new(demand.clone()) });
             world.run_for(Duration::from_millis(400));
         }
         prop_assert!(world.snapshot().gimbals[0].setpoint.is_some(), "it was accepted");
@@ -137,7 +137,7 @@ fn take_step(world: &mut World, places: Places, step: Step) -> usize {
     let place_of = |sender: MavId| if sender.system == 1 { places.autopilot } else { places.ground };
     match step {
         Step::Say { sender, message } => {
-            let is_command = matches!(message, MavMessage::COMMAND_LONG(_) | MavMessage::COMMAND_INT(_));
+            let is_command = matches!(*message, MavMessage::COMMAND_LONG(_) | MavMessage::COMMAND_INT(_));
             let sender = SENDERS[sender];
             let before = world.arrivals(place_of(sender)).len();
             world.send(place_of(sender), sender, &message);
@@ -292,7 +292,7 @@ fn rate_demand() -> BoxedStrategy<MavMessage> {
 fn step() -> BoxedStrategy<Step> {
     let sender = 0..SENDERS.len();
     prop_oneof![
-        12 => (sender.clone(), message()).prop_map(|(sender, message)| Step::Say { sender, message }),
+        12 => (sender.clone(), message()).prop_map(|(sender, message)| Step::Say { sender, message: Box::new(message) }),
         3 => (sender, prop_oneof![Just(75_u32), Just(76), Just(282), Just(284), Just(287), Just(288)], any::<[u8; 40]>(), 1_usize..40)
             .prop_map(|(sender, id, payload, len)| {
                 let len = len.min(message_shape(id).expect("a known message").max_len.into());

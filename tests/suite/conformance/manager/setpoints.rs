@@ -23,7 +23,7 @@ use crate::support::world::{GCS, Places, World, three_links};
 fn item_80_a_pitch_alone_leaves_the_yaw_as_it_was() {
     let golden = hex("fd16000007ffbe1f01002c000000000000bf0000c07f0000c07f0000c07f01bf2272");
     // Without a setpoint before, the yaw is where the gimbal looks (D9).
-    for (asked_before, yaw) in [(None, 25.0), (Some(40.0), 40.0)] {
+    for (asked_before, yaw) in [(None, 25.0), (Some(40.0_f32), 40.0)] {
         let (mut world, places) = with_gimbal();
         look(&mut world, places, -5.0, 25.0);
         if let Some(yaw) = asked_before {
@@ -36,7 +36,7 @@ fn item_80_a_pitch_alone_leaves_the_yaw_as_it_was() {
         let setpoint = only_setpoint(&mut world, places);
         let (pitch, kept) = pitch_yaw_deg(setpoint.q);
         assert_near(pitch, (-0.5_f64).to_degrees(), 0.001);
-        assert_near(kept, yaw.into(), 0.001);
+        assert_near(kept, yaw, 0.001);
         assert_eq!(setpoint.flags, 44);
         assert!(is_nan(&rates(&setpoint)));
     }
