@@ -33,6 +33,18 @@ pub enum Conflict {
 }
 
 impl Conflict {
+    /// Whether both tell of the same parties, who may be better known by one of them.
+    fn is_about_the_same(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::RivalManager { rival, .. }, Self::RivalManager { rival: other, .. }) => rival == other,
+            (
+                Self::RivalMaster { rival, device, .. },
+                Self::RivalMaster { rival: other_rival, device: other_device, .. },
+            ) => (rival, device) == (other_rival, other_device),
+            _ => self == other,
+        }
+    }
+
     /// For the person looking: what is going on, and which setting changes it.
     pub fn describe(&self) -> String {
         match self {
@@ -88,7 +100,9 @@ pub struct Conflicts {
 
 impl Conflicts {
     pub fn note(&mut self, now: Timestamp, conflict: Conflict) {
-        if let Some((_, latest)) = self.noticed.iter_mut().find(|(known, _)| *known == conflict) {
+        if let Some((known, latest)) = self.noticed.iter_mut().find(|(known, _)| known.is_about_the_same(&conflict)) {
+            // Who the other party is may become clear later, and then which of its settings to change.
+            *known = conflict;
             *latest = now;
             return;
         }
@@ -102,5 +116,27 @@ impl Conflicts {
     /// Those noticed within the last half minute.
     pub fn current(&self, now: Timestamp) -> impl Iterator<Item = &Conflict> {
         self.noticed.iter().filter(move |(_, latest)| now.since(*latest) < OVER_AFTER).map(|(conflict, _)| conflict)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A rival is told of once, with the setting to change as soon as it is known whose it is.
+    #[test]
+    fn a_rival_is_told_of_once() {
+        let (rival, device) = (MavId::new(1, 1), MavId::new(1, 154));
+        let steers = |autopilot| Conflict::RivalMaster { rival, device, autopilot, kept_away: true };
+        let manages = Conflict::RivalManager { rival, autopilot: None };
+        let mut conflicts = Conflicts::default();
+        conflicts.note(Timestamp::ZERO, steers(None));
+        conflicts.note(Timestamp::from_secs(1), manages);
+        conflicts.note(Timestamp::from_secs(29), steers(Some(Autopilot::ArduPilot)));
+
+        let at = |secs| conflicts.current(Timestamp::from_secs(secs)).copied().collect::<Vec<_>>();
+        assert_eq!(at(30), [steers(Some(Autopilot::ArduPilot)), manages]);
+        assert_eq!(at(31), [steers(Some(Autopilot::ArduPilot))]);
+        assert_eq!(at(59), []);
     }
 }

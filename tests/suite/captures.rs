@@ -2,13 +2,17 @@
 //!
 //! `UPDATE_CAPTURES=1` rewrites `expected.jsonl`; read the difference before committing it.
 
+mod core;
+
 use std::collections::BTreeMap;
-use std::fmt::Write;
+use std::fs;
+use std::sync::{Mutex, PoisonError};
 
 use gimbald::timestamp::Timestamp;
 use gimbald::wire::decoder::Patience;
 use gimbald::wire::{DatagramFrames, StreamDecoder, WireCounters};
 
+use self::core::Gimbal;
 use crate::support::tlog;
 
 /// A link of a recording: its name, how many frames it carried, and how many of them of unknown messages.
@@ -27,7 +31,7 @@ const CAPTURES: [(&str, &[Link]); 5] = [
 #[test]
 fn every_frame_of_a_recording_is_decoded_or_counted() {
     for (capture, links) in CAPTURES {
-        let mut expected = String::new();
+        let mut lines = Vec::new();
         for (link, frames, unknown) in links {
             let path = tlog::capture(capture).join(format!("{link}.tlog"));
             let records = tlog::read(&path);
@@ -40,17 +44,92 @@ fn every_frame_of_a_recording_is_decoded_or_counted() {
             assert_eq!(stream, datagrams, "{capture}, {link}");
             assert_eq!((clean.frames, stream.unknown), (*frames, *unknown), "{capture}, {link}");
             for ((id, name), count) in &stream.messages {
-                writeln!(expected, r#"{{"link":"{link}","id":{id},"message":"{name}","count":{count}}}"#)
-                    .expect("a string takes everything");
+                lines.push(format!(r#"{{"link":"{link}","id":{id},"message":"{name}","count":{count}}}"#));
             }
         }
-        let path = tlog::capture(capture).join("expected.jsonl");
-        if std::env::var_os("UPDATE_CAPTURES").is_some() {
-            std::fs::write(&path, &expected).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-        }
-        let written = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-        assert_eq!(written, expected, "{capture}");
+        assert_expected(capture, Part::Wire, &lines);
     }
+}
+
+/// How each recording is played through the core, and what the autopilot is to be told to leave the gimbal to us.
+#[rustfmt::skip]
+const REPLAYS: [(&str, &[(&str, Gimbal)], &[&str]); 5] = [
+    ("ap_gremsy_a", &[("gimbal", Gimbal::Simulated), ("ground", Gimbal::Recorded)], &["MNT1_TYPE", "MNT1_TYPE"]),
+    ("ap_none",     &[("ground", Gimbal::Recorded)],                                &[]),
+    ("ap_storm32",  &[("gimbal", Gimbal::Simulated), ("ground", Gimbal::Recorded)], &["MNT1_TYPE", "MNT1_TYPE"]),
+    ("px4_dev",     &[("gimbal", Gimbal::Simulated), ("ground", Gimbal::Recorded)], &["MNT_MODE_IN", "MNT_MODE_IN"]),
+    ("px4_nodev",   &[("ground", Gimbal::Absent)],                                  &[]),
+];
+
+/// "every frame decoded or counted, system id adopted, discovery happens as it should, 286 of the autopilot arrives
+/// byte-identical on the gimbal link, rival managers are reported with the right setting, our manager stays consistent."
+#[test]
+fn a_recorded_flight_goes_through_the_core() {
+    for (capture, recordings, settings) in REPLAYS {
+        let mut lines = Vec::new();
+        let mut remedies = Vec::new();
+        for (recording, gimbal) in recordings {
+            let replay = core::replay(capture, recording, *gimbal);
+
+            replay.assert_everything_was_read();
+            replay.assert_the_system_id_is_adopted();
+            replay.assert_gimbals_hear_the_autopilot();
+            replay.assert_the_gimbal_is_left_alone();
+            replay.assert_our_manager_is_consistent();
+            let found: Vec<_> =
+                replay.snapshot.gimbals.iter().map(|found| (found.device.as_deref(), found.state.as_str())).collect();
+            let expected = (Some("1/154"), "alive");
+            assert_eq!(
+                found,
+                if *gimbal == Gimbal::Absent { vec![] } else { vec![expected] },
+                "{capture}, {recording}"
+            );
+            let rivals = replay.snapshot.conflicts.iter().filter(|conflict| conflict.contains("1/1 "));
+            remedies.extend(rivals.map(|conflict| conflict.to_owned()));
+            lines.extend(replay.lines());
+        }
+        let named = |setting: &&str| remedies.iter().any(|remedy| remedy.contains(*setting));
+        assert!(settings.iter().all(named) && settings.is_empty() == remedies.is_empty(), "{capture}: {remedies:?}");
+        assert_expected(capture, Part::Core, &lines);
+    }
+}
+
+/// Which lines of `expected.jsonl` a test stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Part {
+    /// Those that begin with the link.
+    Wire,
+    /// All others.
+    Core,
+}
+
+impl Part {
+    fn of(line: &str) -> Self {
+        if line.starts_with(r#"{"link":"#) { Self::Wire } else { Self::Core }
+    }
+}
+
+/// Compares one part of `expected.jsonl`, or rewrites it under `UPDATE_CAPTURES`.
+fn assert_expected(capture: &str, part: Part, lines: &[String]) {
+    // The two tests rewrite one file.
+    static FILES: Mutex<()> = Mutex::new(());
+    let guard = FILES.lock().unwrap_or_else(PoisonError::into_inner);
+    let path = tlog::capture(capture).join("expected.jsonl");
+    let read = || fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    if std::env::var_os("UPDATE_CAPTURES").is_some() {
+        let before = read();
+        let of = |wanted: Part| before.lines().filter(move |line| Part::of(line) == wanted).map(str::to_owned);
+        let whole: Vec<String> = match part {
+            Part::Wire => lines.iter().cloned().chain(of(Part::Core)).collect(),
+            Part::Core => of(Part::Wire).chain(lines.iter().cloned()).collect(),
+        };
+        let text: String = whole.into_iter().map(|line| line + "\n").collect();
+        fs::write(&path, text).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    }
+    let written = read();
+    drop(guard);
+    let written: Vec<&str> = written.lines().filter(|line| Part::of(line) == part).collect();
+    assert_eq!(written, lines, "{capture}");
 }
 
 /// What decoding found on one link.

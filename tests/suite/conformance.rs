@@ -4,3 +4,5 @@ mod autopilot_state;
 mod codec;
 mod discovery;
 mod identity;
+mod manager;
+mod mavsdk_trace;

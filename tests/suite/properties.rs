@@ -1,4 +1,5 @@
 //! What holds for any input.
 
+mod manager;
 mod routing;
 mod wire;

@@ -48,11 +48,6 @@ pub fn px4_heartbeat() -> MavMessage {
     heartbeat(2, 12)
 }
 
-/// A multicopter of ArduPilot.
-pub fn ardupilot_heartbeat() -> MavMessage {
-    heartbeat(2, 3)
-}
-
 /// `COMMAND_LONG` with parameters 1 to 7; those left out are NaN.
 pub fn command_long(target: MavId, command: u16, params: &[f32]) -> MavMessage {
     let param = |number: usize| params.get(number - 1).copied().unwrap_or(NAN);

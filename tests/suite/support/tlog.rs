@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use gimbald::timestamp::Timestamp;
-use gimbald::wire::DatagramFrames;
+use gimbald::wire::{DatagramFrames, MavId};
 
 /// One entry of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -11,6 +11,15 @@ pub struct Record {
     /// Time since the first entry.
     pub at: Timestamp,
     pub bytes: Vec<u8>,
+}
+
+impl Record {
+    pub fn source(&self) -> MavId {
+        match self.bytes[0] {
+            0xfd => MavId::new(self.bytes[5], self.bytes[6]),
+            _ => MavId::new(self.bytes[3], self.bytes[4]),
+        }
+    }
 }
 
 /// The folder of a recording below `tests/captures/`.

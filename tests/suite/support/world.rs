@@ -175,6 +175,11 @@ impl World {
         }
     }
 
+    /// What has arrived at a place so far.
+    pub fn arrivals(&self, place: Place) -> &[Arrival] {
+        &self.ends[place.0].arrivals
+    }
+
     /// What has arrived at a place so far; it is forgotten.
     pub fn take(&mut self, place: Place) -> Vec<Arrival> {
         std::mem::take(&mut self.ends[place.0].arrivals)

@@ -1,0 +1,86 @@
+"""What a client sees of the camera's attitude, and when it saw it."""
+
+import threading
+import time
+from collections import deque
+from typing import NamedTuple
+
+from steps import Failure, angle_between, wait_for
+
+
+class Seen(NamedTuple):
+    """Degrees; yaw from the vehicle's nose and from North, each None where the client does not say."""
+
+    time: float
+    pitch: float
+    yaw_vehicle: float
+    yaw_north: float
+
+
+class Attitudes:
+    """Filled by the client's own thread or loop; judged by the script."""
+
+    def __init__(self):
+        self._lock = threading.Lock()
+        self._seen = deque(maxlen=2000)
+
+    def add(self, pitch, yaw_vehicle=None, yaw_north=None):
+        with self._lock:
+            self._seen.append(Seen(time.monotonic(), pitch, yaw_vehicle, yaw_north))
+
+    def since(self, moment):
+        with self._lock:
+            return [seen for seen in self._seen if seen.time >= moment]
+
+    def wait_at(self, timeout=6, steady=5, within=1.0, **wanted):
+        """Waits until the last few are all at the wanted angles; gives the last one."""
+
+        def last():
+            with self._lock:
+                return list(self._seen)[-steady:]
+
+        def arrived():
+            seen = last()
+            near = all(
+                angle_between(getattr(one, axis), angle) <= within for one in seen for axis, angle in wanted.items()
+            )
+            return len(seen) == steady and near
+
+        def missing():
+            at = last()[-1:]
+            return f"within {within}° of {wanted}; {f'last seen {at[0]}' if at else 'no attitude at all'}"
+
+        wait_for(missing, arrived, timeout)
+        return last()[-1]
+
+    def watch(self, seconds):
+        """What arrives from now on for so long."""
+        started = time.monotonic()
+        wait_for(
+            lambda: f"attitudes over {seconds} s; there were {len(self.since(started))}",
+            lambda: (seen := self.since(started)) and seen[-1].time - started >= seconds,
+            seconds + 5,
+        )
+        return self.since(started)
+
+    def rate(self, axis, seconds=2.0):
+        """How fast `axis` turns, degrees per second, over so long from now on."""
+        seen = self.watch(seconds)
+        if len(seen) < 5:
+            raise Failure(f"only {len(seen)} attitudes in {seconds} s")
+        # The slope of the line nearest to all of them: one late arrival does not matter.
+        mean_time = sum(one.time for one in seen) / len(seen)
+        turned, total = [0.0], 0.0
+        for before, after in zip(seen, seen[1:]):
+            total += (getattr(after, axis) - getattr(before, axis) + 180) % 360 - 180
+            turned.append(total)
+        mean_turned = sum(turned) / len(turned)
+        spread = sum((one.time - mean_time) ** 2 for one in seen)
+        return sum((one.time - mean_time) * (angle - mean_turned) for one, angle in zip(seen, turned)) / spread
+
+    def wait_still(self, axis, timeout=6):
+        """Waits until `axis` has stopped turning."""
+        deadline = time.monotonic() + timeout
+        while abs(rate := self.rate(axis, 0.5)) > 0.5:
+            if time.monotonic() > deadline:
+                raise Failure(f"{axis} still turns at {rate:.2f} °/s after {timeout} s")

@@ -1,0 +1,284 @@
+"""A real `gimbald run` between a simulated vehicle and a simulated gimbal, for a real client to talk to.
+
+    gimbal ══pseudo-terminals══ gimbald ──udp── vehicle
+                                   ├── udpin ──  clients that speak first
+                                   └── udpout ── a client that listens
+
+Both cables pass through here, so that a script can see every byte on them.
+"""
+
+import ctypes
+import json
+import os
+import pathlib
+import select
+import signal
+import socket
+import subprocess
+import tempfile
+import threading
+import time
+import tty
+import urllib.error
+import urllib.request
+
+from steps import Failure, wait_for
+
+REPOSITORY = pathlib.Path(__file__).resolve().parents[2]
+GIMBALD = os.environ.get("GIMBALD", str(REPOSITORY / "target/release/gimbald"))
+LOGS = pathlib.Path(os.environ.get("GIMBALD_LOGS", REPOSITORY / "target/tests-run/clients"))
+
+PR_SET_PDEATHSIG = 1
+
+
+def free_port(kind=socket.SOCK_DGRAM):
+    """A port on the loopback that nobody has at the moment."""
+    with socket.socket(socket.AF_INET, kind) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def port_is_free(port, kind=socket.SOCK_DGRAM):
+    with socket.socket(socket.AF_INET, kind) as probe:
+        try:
+            probe.bind(("127.0.0.1", port))
+        except OSError:
+            return False
+    return True
+
+
+def get(url):
+    """The status code and the body of a page."""
+    try:
+        with urllib.request.urlopen(url, timeout=2) as response:
+            return response.status, response.read()
+    except urllib.error.HTTPError as error:
+        return error.code, error.read()
+
+
+class Process:
+    """A child that does not outlive this script; what it says goes into a log file."""
+
+    def __init__(self, name, arguments, log):
+        self.name = name
+        self.log = log
+        libc = ctypes.CDLL(None)
+        with open(log, "wb") as output:
+            self._child = subprocess.Popen(
+                arguments,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                preexec_fn=lambda: libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL),
+            )
+
+    def check(self):
+        code = self._child.poll()
+        if code is not None:
+            raise Failure(f"{self.name} ended with code {code}; its log: {self.log}")
+
+    def end(self, timeout=5):
+        """Asks it to end, and gives its exit code."""
+        self._child.send_signal(signal.SIGTERM)
+        try:
+            return self._child.wait(timeout)
+        except subprocess.TimeoutExpired:
+            return self.kill()
+
+    def kill(self):
+        self._child.kill()
+        return self._child.wait()
+
+
+class Tap:
+    """Something on a thread that passes bytes from side to side and keeps what went by."""
+
+    # A minute of a serial line at full rate, several times over.
+    MOST = 50_000
+
+    def __init__(self):
+        self._lock = threading.Lock()
+        self._from_daemon = []
+        self._from_peer = []
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    def start(self):
+        self._thread.start()
+
+    def _keep(self, chunks, data):
+        with self._lock:
+            if len(chunks) < self.MOST:
+                chunks.append((time.monotonic(), data))
+
+    def seen(self):
+        """What the daemon sent and what the peer sent, each a list of (time, bytes)."""
+        with self._lock:
+            return list(self._from_daemon), list(self._from_peer)
+
+    def close(self):
+        self._stop.set()
+        self._thread.join(5)
+
+    def _run(self):
+        while not self._stop.is_set():
+            self._pass_on()
+
+
+class Cable(Tap):
+    """Two pseudo-terminals, joined: either end opens like a serial port."""
+
+    def __init__(self):
+        super().__init__()
+        self._daemon, daemon_end = os.openpty()
+        self._peer, peer_end = os.openpty()
+        # Held open, so that the cable outlives whoever opens its ends.
+        self._ends = (daemon_end, peer_end)
+        for end in self._ends:
+            tty.setraw(end)
+        self.daemon_path, self.peer_path = map(os.ttyname, self._ends)
+        self.start()
+
+    def _pass_on(self):
+        readable, _, _ = select.select([self._daemon, self._peer], [], [], 0.1)
+        for near, far, chunks in (
+            (self._daemon, self._peer, self._from_daemon),
+            (self._peer, self._daemon, self._from_peer),
+        ):
+            if near in readable:
+                data = os.read(near, 4096)
+                self._keep(chunks, data)
+                while data:
+                    data = data[os.write(far, data) :]
+
+    def close(self):
+        super().close()
+        for descriptor in (self._daemon, self._peer, *self._ends):
+            os.close(descriptor)
+
+
+class Wire(Tap):
+    """A UDP port that passes every datagram on to the daemon, and the answers back."""
+
+    def __init__(self, daemon_port):
+        super().__init__()
+        self._daemon = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._daemon.connect(("127.0.0.1", daemon_port))
+        self._peer = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._peer.bind(("127.0.0.1", 0))
+        self.port = self._peer.getsockname()[1]
+        self._address = None
+        self.start()
+
+    def _pass_on(self):
+        readable, _, _ = select.select([self._daemon, self._peer], [], [], 0.1)
+        try:
+            if self._peer in readable:
+                data, self._address = self._peer.recvfrom(65536)
+                self._keep(self._from_peer, data)
+                self._daemon.send(data)
+            if self._daemon in readable:
+                data = self._daemon.recv(65536)
+                self._keep(self._from_daemon, data)
+                self._peer.sendto(data, self._address)
+        except ConnectionRefusedError:
+            pass  # one of them is not up yet, or no more
+
+    def close(self):
+        super().close()
+        self._daemon.close()
+        self._peer.close()
+
+
+class Rig:
+    """`with Rig("name") as rig:` gives a daemon that has found its vehicle and gimbal."""
+
+    def __init__(self, name, system_id=1, autopilot="px4", settings=""):
+        self._name = name
+        self._system_id = system_id
+        self._autopilot = autopilot
+        self._settings = settings
+        self._processes = []
+        self.ground_port = free_port()
+        self.listener_port = free_port()
+        self._listen = f"127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+        self.http = f"http://{self._listen}"
+
+    def __enter__(self):
+        LOGS.mkdir(parents=True, exist_ok=True)
+        self._folder = tempfile.TemporaryDirectory(prefix="gimbald-")
+        autopilot_port = free_port()
+        self.cable = Cable()
+        self.wire = Wire(autopilot_port)
+        config = pathlib.Path(self._folder.name) / "gimbald.toml"
+        config.write_text(
+            f"""
+[[link]]
+name = "gimbal"
+role = "gimbal"
+endpoint = "serial:{self.cable.daemon_path}:115200"
+
+[[link]]
+name = "autopilot"
+role = "autopilot"
+endpoint = "udpin:127.0.0.1:{autopilot_port}"
+
+[[link]]
+name = "ground"
+role = "ground"
+endpoint = "udpin:127.0.0.1:{self.ground_port}"
+
+[[link]]
+name = "listener"
+role = "ground"
+endpoint = "udpout:127.0.0.1:{self.listener_port}"
+
+[http]
+listen = "{self._listen}"
+
+{self._settings}
+"""
+        )
+        system_id = str(self._system_id)
+        vehicle = ["--endpoint", f"udpout:127.0.0.1:{self.wire.port}", "--autopilot", self._autopilot]
+        gimbal = ["--endpoint", f"serial:{self.cable.peer_path}:115200"]
+        try:
+            self.daemon = self._start("daemon", "--log", "debug", "run", "--config", str(config))
+            self._start("vehicle", "sim", "vehicle", "--system-id", system_id, *vehicle)
+            self._start("gimbal", "sim", "gimbal", "--system-id", system_id, *gimbal)
+            wait_for("vehicle and gimbal known to the daemon", self._is_ready, 20)
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_):
+        for process in reversed(self._processes):
+            process.kill()
+        self.cable.close()
+        self.wire.close()
+        self._folder.cleanup()
+
+    def _start(self, part, *arguments):
+        process = Process(f"gimbald ({part})", [GIMBALD, *arguments], LOGS / f"{self._name}-{part}.log")
+        self._processes.append(process)
+        return process
+
+    def _is_ready(self):
+        for process in self._processes:
+            process.check()
+        try:
+            status = self.status()
+        except OSError:
+            return False  # the page is not up yet
+        gimbals, vehicle = status["gimbals"], status["vehicle"]
+        if not gimbals or gimbals[0]["state"] != "alive" or not gimbals[0]["model"]:
+            return False
+        return vehicle["heading_deg"] is not None and vehicle["position_age_ms"] is not None
+
+    def status(self):
+        return json.loads(get(f"{self.http}/api/v1/status")[1])
+
+    def gimbal(self):
+        """The only gimbal, as the daemon sees it."""
+        return self.status()["gimbals"][0]

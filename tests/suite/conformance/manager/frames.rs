@@ -1,0 +1,159 @@
+//! What yaw is measured from (protocol checklist 8.7).
+
+use std::time::Duration;
+
+use gimbald::bridge::snapshot::AttitudeSnapshot;
+use gimbald::wire::MavId;
+use gimbald::wire::dialect::{GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, MavMessage};
+
+use super::{SECOND, assert_near, only_setpoint, run_looking, setpoints, with_gimbal};
+use crate::support::script::{
+    ACCEPTED, NAN, TEMPORARILY_REJECTED, autopilot_state, device_status, pitch_yaw_deg, pitchyaw, px4_heartbeat,
+    quaternion,
+};
+use crate::support::wire::{frame_v2, hex};
+use crate::support::world::{AUTOPILOT, GCS, GIMBAL, Places, World};
+
+/// What a 285 means, for each way in which gimbals say it. The autopilot's heading is 10°.
+///
+/// Protocol checklist 103: "When 285 has flags 44, q yaw 30° and delta_yaw 100° (extension present), HTTP reports
+/// yaw_vehicle 30°, yaw_earth 130°."
+/// Protocol checklist 104: "When 285 has flags 76 (R+P lock, EARTH) and delta_yaw 100°, q yaw 130° is reported as
+/// yaw_earth 130°, yaw_vehicle 30°."
+/// Protocol checklist 105: "When 285 has flags 28 (legacy, LOCK, no frame bit), yaw is earth; delta_yaw is ignored even
+/// if non-zero."
+/// Protocol checklist 106: "When 285 has flags 12 (legacy, no LOCK), yaw is vehicle".
+/// Protocol checklist 108: "When delta_yaw is NaN, the autopilot's heading is used."
+#[test]
+#[rustfmt::skip]
+fn items_103_to_108_yaw_is_shown_in_both_frames() {
+    for (flags, yaw,   delta_yaw, in_vehicle, in_earth) in [
+        (44,    30.0,  100.0,     30.0,       130.0),
+        (76,    130.0, 100.0,     30.0,       130.0),
+        (28,    130.0, 100.0,     120.0,      130.0),
+        (12,    30.0,  100.0,     30.0,       40.0),
+        (44,    30.0,  f32::NAN,  30.0,       40.0),
+        (76,    30.0,  f32::NAN,  20.0,       30.0),
+        (44,    170.0, 100.0,     170.0,      -90.0),
+    ] {
+        let (mut world, places) = with_gimbal();
+        turn_vehicle(&mut world, places, 10.0);
+        let status = device_status(world.now, flags, 0.0, yaw);
+        let status = GIMBAL_DEVICE_ATTITUDE_STATUS_DATA { delta_yaw: delta_yaw.to_radians(), ..status };
+
+        world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status));
+
+        let shown = attitude(&world);
+        assert_near(shown.yaw_vehicle_deg.expect("known"), in_vehicle, 0.01);
+        assert_near(shown.yaw_earth_deg.expect("known"), in_earth, 0.01);
+    }
+}
+
+/// "GV-7 decodes so": the legacy form without extensions.
+#[test]
+fn item_106_the_golden_vector_of_a_legacy_gimbal_is_in_the_vehicle_frame() {
+    let (mut world, places) = with_gimbal();
+    turn_vehicle(&mut world, places, 10.0);
+    let golden =
+        hex("fd25000005019a1d0100881300000000803f0000000000000000000000000000c07f0000c07f0000c07f000000000cb75e");
+
+    world.send_bytes(places.gimbal, &golden);
+
+    let shown = attitude(&world);
+    assert_near(shown.yaw_vehicle_deg.expect("known"), 0.0, 1e-6);
+    assert_near(shown.yaw_earth_deg.expect("known"), 10.0, 0.01);
+}
+
+/// "When 285 is 40 bytes long with flags 44, delta_yaw is unknown and the autopilot's heading is used."
+#[test]
+fn item_107_a_heading_that_was_not_sent_is_not_north() {
+    let (mut world, places) = with_gimbal();
+    turn_vehicle(&mut world, places, 10.0);
+    let mut payload = Vec::new();
+    payload.extend_from_slice(&5_000_u32.to_le_bytes());
+    for number in quaternion(0.0, 30.0).into_iter().chain([0.0; 3]) {
+        payload.extend_from_slice(&number.to_le_bytes());
+    }
+    payload.extend_from_slice(&0_u32.to_le_bytes());
+    payload.extend_from_slice(&44_u16.to_le_bytes());
+    payload.extend_from_slice(&[0, 0]);
+    assert_eq!(payload.len(), 40);
+    for len in [37, 38, 40] {
+        world.send_bytes(places.gimbal, &frame_v2(285, 137, 0, &payload[..len], None));
+        assert_near(attitude(&world).yaw_earth_deg.expect("known"), 40.0, 0.01);
+    }
+}
+
+/// "When a client asks earth yaw 90° and the device reports bit 128, 284 has flags 92 and yaw 90°."
+/// Protocol checklist 110: "When the device does not accept earth yaw and heading is 30°, the same request gives flags 44
+/// and yaw 60°, and follows as the heading changes, updating within 100 ms."
+#[test]
+fn items_109_and_110_north_is_held_by_the_device_or_by_us() {
+    for asked in [16.0, 28.0, 64.0, 92.0] {
+        let (mut world, places) = with_gimbal();
+        let status = device_status(world.now, 44 | 128, 0.0, 0.0);
+        world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status));
+        assert_eq!(world.result_of(places.ground, GCS, &pitchyaw(0.0, 90.0, NAN, NAN, asked)), Some(ACCEPTED));
+        let setpoint = only_setpoint(&mut world, places);
+        assert_eq!(setpoint.flags, 92, "asked {asked}");
+        assert_near(pitch_yaw_deg(setpoint.q).1, 90.0, 0.001);
+
+        let (mut world, places) = with_gimbal();
+        turn_vehicle(&mut world, places, 30.0);
+        assert_eq!(world.result_of(places.ground, GCS, &pitchyaw(0.0, 90.0, NAN, NAN, asked)), Some(ACCEPTED));
+        let setpoint = only_setpoint(&mut world, places);
+        assert_eq!(setpoint.flags, 44, "asked {asked}");
+        assert_near(pitch_yaw_deg(setpoint.q).1, 60.0, 0.001);
+
+        turn_vehicle(&mut world, places, 50.0);
+        world.run_for(Duration::from_millis(100));
+        let followed = setpoints(&mut world, places).pop().expect("it is streamed").1;
+        assert_near(pitch_yaw_deg(followed.q).1, 40.0, 0.001);
+    }
+}
+
+/// "When heading is unknown or stale (> 1 s) and conversion is needed, 1000 → TEMPORARILY_REJECTED."
+#[test]
+fn item_111_without_a_heading_north_cannot_be_held() {
+    let to_north = pitchyaw(0.0, 90.0, NAN, NAN, 92.0);
+    let (mut world, places) = with_gimbal();
+    assert_eq!(world.result_of(places.ground, GCS, &to_north), Some(TEMPORARILY_REJECTED), "unknown");
+    assert_eq!(setpoints(&mut world, places), []);
+
+    turn_vehicle(&mut world, places, 30.0);
+    run_looking(&mut world, places, SECOND, 0.0, 0.0);
+    assert_eq!(world.result_of(places.ground, GCS, &to_north), Some(ACCEPTED), "one second old");
+    let (mut world, places) = with_gimbal();
+    turn_vehicle(&mut world, places, 30.0);
+    run_looking(&mut world, places, Duration::from_millis(1_001), 0.0, 0.0);
+    assert_eq!(world.result_of(places.ground, GCS, &to_north), Some(TEMPORARILY_REJECTED), "stale");
+    assert_eq!(setpoints(&mut world, places), []);
+    // From the nose it needs none.
+    assert_eq!(world.result_of(places.ground, GCS, &pitchyaw(0.0, 90.0, NAN, NAN, 44.0)), Some(ACCEPTED));
+}
+
+/// "When q is pitch −90°, yaw 60° the reported yaw is 60° ± 0.01°, not 26.6°."
+#[test]
+fn item_112_straight_down_the_yaw_is_still_right() {
+    let (mut world, places) = with_gimbal();
+    let status = device_status(world.now, 44, 0.0, 0.0);
+    let q = [0.612_372_4, 0.353_553_4, -0.612_372_4, 0.353_553_4];
+    let status = GIMBAL_DEVICE_ATTITUDE_STATUS_DATA { q, ..status };
+
+    world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status));
+
+    let shown = attitude(&world);
+    assert_near(shown.yaw_vehicle_deg.expect("known"), 60.0, 0.01);
+    assert_near(shown.pitch_deg.expect("known"), -90.0, 0.05);
+}
+
+/// The autopilot says that the vehicle looks to `heading_deg`.
+pub fn turn_vehicle(world: &mut World, places: Places, heading_deg: f64) {
+    world.send(places.autopilot, AUTOPILOT, &px4_heartbeat());
+    let state = autopilot_state(world.now, MavId::new(0, 0), heading_deg);
+    world.send(places.autopilot, AUTOPILOT, &MavMessage::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE(state));
+}
+
+fn attitude(world: &World) -> AttitudeSnapshot {
+    world.snapshot().gimbals[0].attitude.clone()
+}
