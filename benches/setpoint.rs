@@ -76,7 +76,7 @@ impl Rig {
 
     /// Lets time pass for everybody.
     fn pass(&mut self, time: Duration) {
-        self.now = self.now + time;
+        self.now += time;
         self.gimbal.handle_timeout(self.now);
         self.bridge.handle_timeout(self.now);
         while let Some(output) = self.bridge.poll_output() {
@@ -94,7 +94,7 @@ impl Rig {
 
     /// One demand; its setpoint must come out at once.
     fn demand(&mut self, bytes: &[u8]) {
-        self.now = self.now + Duration::from_millis(1);
+        self.now += Duration::from_millis(1);
         self.bridge.handle_input(self.now, Input::Received { channel: channel(1), bytes });
         let mut steered = false;
         while let Some(output) = self.bridge.poll_output() {

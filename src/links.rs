@@ -12,6 +12,7 @@ pub mod input_ready;
 mod peers;
 mod send_failures;
 mod serial;
+pub mod serial_port;
 mod tcp_client;
 mod tcp_server;
 mod udp_client;

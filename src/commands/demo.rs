@@ -14,6 +14,7 @@ use tokio::sync::oneshot;
 use crate::bridge::settings::{Role, Settings};
 use crate::cli::{DemoArgs, SimulatedFamily};
 use crate::config::settings::{DaemonSettings, HttpSettings, link_on};
+use crate::daemon::clock::unix_time_us;
 use crate::daemon::supervisor;
 use crate::endpoint::Endpoint;
 use crate::exit_code::ExitCode;
@@ -62,7 +63,8 @@ fn run(arguments: &DemoArgs, output: &mut impl Write) -> Result<(), DemoError> {
     let autopilot = free_port().map_err(DemoError::Port)?;
     let settings = daemon_settings(arguments, Endpoint::Serial { path, baud: GIMBAL_BAUD }, autopilot);
 
-    let vehicle = Simulation::start("vehicle", Vehicle::new(Timestamp::ZERO, VehicleSettings::default()), move || {
+    let vehicle = VehicleSettings { unix_time_us: unix_time_us(), ..VehicleSettings::default() };
+    let vehicle = Simulation::start("vehicle", Vehicle::new(Timestamp::ZERO, vehicle), move || {
         Ok(links::link(&Endpoint::UdpOut(autopilot)))
     })?;
     let gimbal = match arguments.family {

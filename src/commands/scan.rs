@@ -8,9 +8,9 @@ use std::fmt;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
-use mio_serial::{ClearBuffer, SerialPort, SerialStream};
 use tokio::io::unix::AsyncFd;
 use tokio::time::timeout;
+use tokio_serial::{ClearBuffer, SerialPort, SerialStream};
 
 use self::conversation::{Conversation, Party};
 use self::ports::{Port, PortError};

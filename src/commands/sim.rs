@@ -4,6 +4,7 @@ use std::io::Write;
 use std::time::Duration;
 
 use crate::cli::{SimCommand, SimGimbalArgs, SimVehicleArgs, SimulatedAutopilot, SimulatedFamily, SimulatedFrames};
+use crate::daemon::clock::unix_time_us;
 use crate::endpoint::Endpoint;
 use crate::exit_code::ExitCode;
 use crate::gimbals::mavlink_v2::sim::{Device, DeviceSettings, Strictness, SystemId};
@@ -62,7 +63,7 @@ pub fn run_sim_vehicle(arguments: &SimVehicleArgs, errors: &mut impl Write) -> E
         },
         system_id: arguments.system_id,
         tells_gimbals: !arguments.no_autopilot_state,
-        unix_time_us: None,
+        unix_time_us: unix_time_us(),
     };
     run(Vehicle::new(Timestamp::ZERO, settings), &arguments.endpoint, errors)
 }

@@ -3,7 +3,7 @@
 use std::io;
 use std::os::fd::{AsFd, AsRawFd, RawFd};
 use std::task::{Context, Poll};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use nix::sys::time::TimeSpec;
 use nix::sys::timerfd::{ClockId, Expiration, TimerFd, TimerFlags, TimerSetTimeFlags};
@@ -27,6 +27,13 @@ impl Clock {
     pub fn now(&self) -> Timestamp {
         Timestamp::ZERO + self.start.elapsed()
     }
+}
+
+/// The wall time as the system has it, in microseconds since 1970; `None` when that lies before 1970.
+#[expect(clippy::disallowed_methods, reason = "this is where time enters")]
+pub fn unix_time_us() -> Option<u64> {
+    let since_1970 = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).ok()?;
+    u64::try_from(since_1970.as_micros()).ok()
 }
 
 /// Wakes at one moment, to the microsecond: a frame on a fast serial line is shorter than the millisecond that the

@@ -1,18 +1,18 @@
 //! `serial`: a serial port or pseudo-terminal, which may go and come back at any time.
 
-use std::io::{self, Read, Write};
+use std::io;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
-use mio_serial::{ClearBuffer, SerialPort, SerialStream};
 use tokio::io::unix::AsyncFd;
+use tokio_serial::{ClearBuffer, SerialPort, SerialStream};
 
 use super::backoff::Backoff;
 use super::frame_queue::FrameQueue;
 use super::inbox::{Inbox, PeerIndex, PeerSet};
 use super::input_ready::watch_input;
 use super::send_failures::SendFailures;
-use super::{Link, Progress, cause};
+use super::{Link, Progress, cause, serial_port};
 use crate::timestamp::Timestamp;
 
 const PEER: PeerIndex = 0;
@@ -78,8 +78,7 @@ impl SerialLink {
 
 impl Port {
     fn open(path: &str, baud: u32) -> io::Result<Self> {
-        // Opens for itself alone (`TIOCEXCL` and a lock) and without blocking.
-        let device = SerialStream::open(&mio_serial::new(path, baud))?;
+        let device = serial_port::open(path, baud)?;
         // What came in while nobody listened is stale.
         device.clear(ClearBuffer::Input)?;
         Ok(Self { device: watch_input(device)?, output: FrameQueue::new(OUTPUT_LIMIT), retry_at: None, failure: None })
@@ -88,11 +87,11 @@ impl Port {
     fn poll(&mut self, cx: &mut Context<'_>, inbox: &mut Inbox) -> io::Result<Progress> {
         for _ in 0..READS {
             let Some(buffer) = inbox.buffer() else { return Ok(Progress::More) };
-            let mut ready = match self.device.poll_read_ready(cx) {
+            let mut ready = match self.device.poll_read_ready_mut(cx) {
                 Poll::Pending => return Ok(Progress::Idle),
                 Poll::Ready(ready) => ready?,
             };
-            match ready.get_inner().read(&mut buffer[..READ_LENGTH]) {
+            match ready.get_inner_mut().try_read(&mut buffer[..READ_LENGTH]) {
                 Ok(0) => return Err(io::Error::new(io::ErrorKind::UnexpectedEof, "the device is gone")),
                 Ok(length) => {
                     // Fewer bytes than asked for means that there are no more.
@@ -113,8 +112,8 @@ impl Port {
         if self.output.is_empty() {
             return;
         }
-        let device = self.device.get_ref();
-        if let Err(error) = self.output.write(now, |bytes| (&*device).write(bytes)) {
+        let device = self.device.get_mut();
+        if let Err(error) = self.output.write(now, |bytes| device.try_write(bytes)) {
             self.failure = Some(error);
         }
         self.retry_at = self.output.stalled_since().map(|_| now + RETRY_INTERVAL);
@@ -202,6 +201,7 @@ impl Link for SerialLink {
 #[cfg(test)]
 mod tests {
     use std::fs::File;
+    use std::io::Write;
     use std::os::fd::AsFd;
     use std::os::unix::fs::symlink;
     use std::path::{Path, PathBuf};

@@ -1,5 +1,6 @@
 //! What more than one test needs.
 
+pub mod daemon;
 pub mod line;
 pub mod script;
 pub mod tlog;

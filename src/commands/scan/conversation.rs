@@ -176,11 +176,14 @@ mod tests {
     use crate::wire::dialect::COMMAND_LONG_DATA;
     use crate::wire::ids::command;
 
+    /// Frames with the time when they were sent.
+    type Sent = Vec<(Timestamp, Vec<u8>)>;
+
     /// Runs a conversation with `peer` to its end: when that was, who was there, and what was sent when.
-    fn run(mut peer: impl Peer) -> (Timestamp, BTreeMap<MavId, Party>, Vec<(Timestamp, Vec<u8>)>) {
+    fn run(mut peer: impl Peer) -> (Timestamp, BTreeMap<MavId, Party>, Sent) {
         let mut now = Timestamp::ZERO;
         let mut conversation = Conversation::new(now, 115_200);
-        let mut sent = Vec::new();
+        let mut sent = Sent::new();
         loop {
             peer.handle_timeout(now);
             conversation.handle_timeout(now);

@@ -6,10 +6,12 @@ use std::io::{self, IsTerminal};
 use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
-use mio_serial::{ErrorKind, SerialStream};
 use nix::errno::Errno;
 use nix::fcntl::OFlag;
 use nix::sys::stat::{major, minor};
+use tokio_serial::{ErrorKind, SerialStream};
+
+use crate::links::serial_port;
 
 /// A serial port under the name that is shown.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -54,7 +56,7 @@ impl Port {
             return Err(PortError::NotASerialPort);
         }
         let path = self.device.to_str().ok_or_else(|| PortError::Open("its name is no UTF-8".to_owned()))?;
-        SerialStream::open(&mio_serial::new(path, baud)).map_err(|error| match error.kind {
+        serial_port::open(path, baud).map_err(|error| match error.kind {
             // So the library calls a lock, or a port that was opened for its holder alone.
             ErrorKind::NoDevice => PortError::InUse,
             ErrorKind::InvalidInput | ErrorKind::Unknown | ErrorKind::Io(_) => PortError::Open(error.description),

@@ -80,7 +80,7 @@ fn item_140_a_state_that_comes_or_is_refused_or_not_wanted_is_not_asked_for() {
     for _ in 0..300 {
         world.run_with(SECOND / 10, &[autopilot.clone(), gimbal.clone()]);
         let asked = world.take(places.autopilot);
-        if asked.iter().any(|arrival| is_state_request(arrival)) {
+        if asked.iter().any(is_state_request) {
             world.run_with(Duration::from_millis(20), &[]);
             world.send(places.autopilot, AUTOPILOT, &MavMessage::COMMAND_ACK(ack(MANAGER, 511, 2)));
             world.run_with(Duration::from_secs(30), &[autopilot, gimbal]);

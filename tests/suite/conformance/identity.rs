@@ -231,7 +231,8 @@ fn d20_another_who_sends_as_us_is_a_conflict_and_is_forwarded() {
     let sent = world.send(places.autopilot, MANAGER, &heartbeat(18, 8));
 
     for place in [places.gimbal, places.ground] {
-        assert_eq!(world.take(place).into_iter().map(|arrival| arrival.bytes).collect::<Vec<_>>(), [sent.clone()]);
+        let arrived: Vec<Vec<u8>> = world.take(place).into_iter().map(|arrival| arrival.bytes).collect();
+        assert_eq!(arrived, std::slice::from_ref(&sent));
     }
     assert_eq!(world.take(places.autopilot), []);
     let snapshot = world.snapshot();

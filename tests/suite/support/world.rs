@@ -117,11 +117,6 @@ impl World {
         self.settle();
     }
 
-    /// Takes the peer away; it says nothing more.
-    pub fn remove_peer(&mut self, place: Place) {
-        self.ends[place.0].peer = None;
-    }
-
     /// Bytes from a place, as one read.
     pub fn send_bytes(&mut self, from: Place, bytes: &[u8]) {
         let channel = self.ends[from.0].channel;
@@ -150,29 +145,6 @@ impl World {
             self.step_to(next);
         }
         self.now = end;
-    }
-
-    /// Goes to the next moment at which anything happens.
-    pub fn run_to_next_event(&mut self) {
-        let next = self.next_event().expect("something is always due");
-        self.step_to(next);
-    }
-
-    /// Runs as [`run_for`](Self::run_for) while a component at `from` repeats a message.
-    pub fn run_while_repeating(
-        &mut self,
-        duration: Duration,
-        every: Duration,
-        from: Place,
-        source: MavId,
-        message: &MavMessage,
-    ) {
-        let end = self.now + duration;
-        while self.now < end {
-            self.send(from, source, message);
-            let left = end - self.now;
-            self.run_for(every.min(left));
-        }
     }
 
     /// What has arrived at a place so far.
