@@ -46,7 +46,7 @@ fn sigterm_stops_the_gimbal_and_says_goodbye() {
         heard.extend(gimbal.take_heard());
         heard.iter().any(is_goodbye).then_some(())
     });
-    let last_setpoint = heard.iter().filter_map(Heard::decode).last();
+    let last_setpoint = heard.iter().rev().find_map(Heard::decode);
     let stop: GIMBAL_DEVICE_SET_ATTITUDE_DATA = last_setpoint.expect("a setpoint before the goodbye");
     assert_eq!((stop.angular_velocity_y, stop.angular_velocity_z), (0.0, 0.0));
     assert!(heard.last().is_some_and(is_goodbye), "the goodbye is the last word: {heard:?}");

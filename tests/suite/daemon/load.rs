@@ -96,12 +96,10 @@ fn on_a_full_line_commands_come_before_streams() {
     // 400 broadcasts of 40 bytes a second are eight times what the line can carry; ten commands a second are a fifth of it.
     let mut decoder = StreamDecoder::new(Patience::Serial { baud: 19_200 });
     let (mut broadcasts, mut commands) = (Vec::new(), Vec::new());
-    let mut sent = 0;
     for step in 0..1_000 {
-        let due = Timestamp::from_micros(2_500 * step);
+        let due = Timestamp::from_micros(2_500 * u64::from(step));
         sleep(due.since(ground.clock.now()));
-        ground.send(&attitude(sent));
-        sent += 1;
+        ground.send(&attitude(step));
         if step % 40 == 0 {
             let number = (step / 40) as f32;
             ground.send(&command(numbers::SET_MESSAGE_INTERVAL, number, REMOTE));

@@ -6,6 +6,7 @@ use std::time::Duration;
 use serde_json::{Value, json};
 
 use super::{one_link, simulated_gimbal, three_links};
+use crate::gimbald::gimbald;
 use crate::support::daemon::{Site, Station, wait_for};
 use crate::support::world::{GCS, MANAGER, heartbeat};
 
@@ -72,4 +73,25 @@ fn a_page_that_cannot_open_costs_no_frames_and_comes_later() {
 
     assert_eq!(daemon.wait_until_up().system_id, Some(1));
     assert!(daemon.is_alive());
+}
+
+/// "Touches nothing while `run` holds the port."
+#[test]
+fn scan_leaves_the_port_of_a_running_daemon_alone() {
+    let site = Site::new();
+    let gimbal = simulated_gimbal();
+    let _cable = gimbal.plug_in(&site.path("gimbal"));
+    let daemon = site.start(&three_links(), &[]);
+    daemon.wait_for_gimbal();
+    gimbal.take_heard();
+
+    let outcome = gimbald(site.folder.path(), &["scan", "gimbal"], &[]);
+
+    assert_eq!((outcome.code, outcome.output.as_str()), (Some(69), ""));
+    // The far end is open in this test too, and whoever is found first is named.
+    let start = format!("{}: in use by ", site.path("gimbal").display());
+    assert!(outcome.errors.starts_with(&start), "{}", outcome.errors);
+    assert!(outcome.errors.ends_with(")\ngimbald scan: nothing answered\n"), "{}", outcome.errors);
+    assert!(gimbal.take_heard().iter().all(|heard| heard.source == MANAGER));
+    assert_eq!(daemon.status().links[1].state, "up");
 }
