@@ -32,7 +32,7 @@ fn forwarding_in_the_steady_state_allocates_nothing() {
     let mut round = || {
         let mut forwarded = 0;
         for bytes in &others {
-            now = now + Duration::from_millis(1);
+            now += Duration::from_millis(1);
             forwarded += receive(&mut bridge, now, 0, bytes);
             forwarded += receive(&mut bridge, now, 1, &attitude);
         }

@@ -102,7 +102,7 @@ fn pass(links: &[LinkSettings], traffic: &[Said]) -> Vec<Passage> {
     let mut heard: BTreeMap<MavId, BTreeMap<usize, Timestamp>> = BTreeMap::new();
     let mut passages = Vec::new();
     for (number, said) in traffic.iter().enumerate() {
-        now = now + said.after;
+        now += said.after;
         let from = said.from % links.len();
         heard.entry(said.source).or_default().insert(from, now);
         let bytes = said.bytes(number);
