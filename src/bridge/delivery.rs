@@ -148,7 +148,7 @@ impl Bridge {
         }
         let Some(request) = read_request(frame) else { return };
         let sender = Sender { id: frame.source(), channel: from };
-        let other_vehicle = sender.id.system != system && self.vehicles[usize::from(sender.id.system)].is_some();
+        let other_vehicle = self.is_other_vehicle(sender.id);
         let around = Surroundings { vehicle: &self.vehicle, autopilot: self.autopilot, overheard, other_vehicle };
         for gimbal in self.roster.iter_mut().filter(|gimbal| for_us(gimbal.component)) {
             match &request {
@@ -206,6 +206,11 @@ impl Bridge {
         channels.without(dropped)
     }
 
+    /// D5: whether `id` is in a system that has an autopilot and is not ours.
+    fn is_other_vehicle(&self, id: MavId) -> bool {
+        Some(id.system) != self.identity.system() && self.vehicles[usize::from(id.system)].is_some()
+    }
+
     fn is_state_for_gimbals(&self, frame: &Frame<'_>) -> bool {
         frame.message_id() == message::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE
             && self.autopilot == Some(frame.source())
@@ -223,6 +228,8 @@ impl Bridge {
             return gimbals.intersection(self.router.routes().component_channels(target));
         }
         match frame.message_id() {
+            // The state of another vehicle would turn our camera.
+            message::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE if self.is_other_vehicle(frame.source()) => ChannelSet::EMPTY,
             message::HEARTBEAT
             | message::SYSTEM_TIME
             | message::TIMESYNC
@@ -285,7 +292,9 @@ impl Bridge {
         if !kept_away {
             return channels;
         }
-        let guarded = channels.intersection(self.channels_of_devices(frame.target()));
+        // On a gimbal's own link also before the device there is known to us.
+        let guarded = self.channels_of_devices(frame.target()).union(self.channels.with_role(Role::Gimbal));
+        let guarded = channels.intersection(guarded);
         self.drop_towards(channels, guarded, "firewall")
     }
 

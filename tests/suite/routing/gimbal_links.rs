@@ -33,6 +33,8 @@ fn d14_of_what_is_said_to_all_a_gimbal_gets_what_it_uses() {
         }
         let frames = match with_target {
             true => vec![addressed(GROUND, shape.id, (0, 0)), addressed(GROUND, shape.id, (1, 0))],
+            // A heartbeat of zeros would be that of another vehicle's autopilot.
+            false if shape.id == HEARTBEAT => vec![frame(GROUND, HEARTBEAT, &[0, 0, 0, 0, 6, 8, 0, 4, 3])],
             false => vec![broadcast(GROUND, shape.id)],
         };
         for bytes in frames {
@@ -79,8 +81,10 @@ fn d14_the_state_of_the_vehicle_reaches_every_gimbal() {
         rig.introduce("autopilot", AUTOPILOT);
         assert!(rig.deliver("autopilot", &addressed(AUTOPILOT, 286, target)).contains(&"gimbal"), "{target:?}");
         rig.introduce("ground", OTHER_AUTOPILOT);
-        let other = rig.deliver("ground", &addressed(OTHER_AUTOPILOT, 286, (9, 0)));
-        assert!(!other.contains(&"gimbal"), "another vehicle's is not for ours");
+        for other in [(9, 0), (0, 0)] {
+            let reached = rig.deliver("ground", &addressed(OTHER_AUTOPILOT, 286, other));
+            assert!(!reached.contains(&"gimbal"), "another vehicle's, to {other:?}, is not for ours");
+        }
     }
 }
 

@@ -1,0 +1,121 @@
+//! Movements that take time: rotations of the device's own, and angles on their way.
+
+use std::time::Duration;
+
+use super::situation::{Pose, Situation};
+use crate::geometry::{Angle, AngularRate, Yaw, YawFrame};
+use crate::gimbals::setpoint::{Stabilised, Turning};
+use crate::timestamp::Timestamp;
+
+/// After a rotation was stopped the gimbal gets so long to come to rest; then its attitude is held.
+pub const SETTLE: Duration = Duration::from_millis(300);
+
+/// A rotation that the device carries out by itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Turn {
+    pub(super) turning: Turning,
+    pub(super) stops_at: Option<Timestamp>,
+    /// The rates are zero, and the attitude then is to be held.
+    pub(super) settles_at: Option<Timestamp>,
+}
+
+/// Angles, which may be on their way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Point {
+    pub(super) roll: Axis,
+    pub(super) pitch: Axis,
+    pub(super) yaw: Axis,
+    pub(super) frame: YawFrame,
+    pub(super) stabilised: Stabilised,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Axis {
+    pub(super) at: Angle,
+    pub(super) motion: Motion,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Motion {
+    Still,
+    /// To an angle, no faster than a rate.
+    Slew {
+        to: Angle,
+        rate: AngularRate,
+    },
+    Turning {
+        rate: AngularRate,
+        until: Option<Timestamp>,
+    },
+}
+
+pub(super) fn is_zero(turning: &Turning) -> bool {
+    [turning.roll.unwrap_or(AngularRate::ZERO), turning.pitch, turning.yaw]
+        .iter()
+        .all(|rate| rate.radians_per_second() == 0.0)
+}
+
+impl Turn {
+    pub(super) fn stop(&mut self, now: Timestamp) {
+        self.turning = Turning {
+            roll: self.turning.roll.map(|_| AngularRate::ZERO),
+            pitch: AngularRate::ZERO,
+            yaw: AngularRate::ZERO,
+            ..self.turning
+        };
+        self.stops_at = None;
+        self.settles_at = Some(now + SETTLE);
+    }
+}
+
+impl Point {
+    pub(super) fn still(pose: Pose, frame: YawFrame, stabilised: Stabilised) -> Self {
+        Self {
+            roll: Axis::still(pose.roll),
+            pitch: Axis::still(pose.pitch),
+            yaw: Axis::still(pose.yaw),
+            frame,
+            stabilised,
+        }
+    }
+}
+
+impl Axis {
+    pub(super) const fn still(at: Angle) -> Self {
+        Self { at, motion: Motion::Still }
+    }
+
+    pub(super) fn carry_on(&mut self, now: Timestamp, passed: Duration, clamp: impl Fn(Angle) -> Angle) {
+        match self.motion {
+            Motion::Still => {}
+            Motion::Slew { to, rate } => {
+                let step = rate.over(passed);
+                let left = to - self.at;
+                if left.abs() <= step {
+                    *self = Self::still(to);
+                } else {
+                    self.at += if left > Angle::ZERO { step } else { -step };
+                }
+            }
+            Motion::Turning { rate, until } => {
+                self.at = clamp(self.at + rate.over(passed));
+                if until.is_some_and(|until| until <= now) {
+                    self.motion = Motion::Still;
+                }
+            }
+        }
+    }
+}
+
+/// Keeps a moving yaw within the end stops, which are the vehicle's also while North is held.
+pub(super) fn clamp_yaw(angle: Angle, frame: YawFrame, heading: Option<Angle>, situation: &Situation<'_>) -> Angle {
+    let Some(limits) = situation.capabilities.limits.yaw else { return angle };
+    let Some(Yaw::InVehicleFrame(vehicle)) = Yaw::new(frame, angle).in_frame(YawFrame::Vehicle, heading) else {
+        return angle;
+    };
+    if vehicle >= limits.min() && vehicle <= limits.max() {
+        return angle;
+    }
+    let stopped = Yaw::InVehicleFrame(limits.clamp(vehicle));
+    stopped.in_frame(frame, heading).map_or(angle, Yaw::angle)
+}

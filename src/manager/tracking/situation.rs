@@ -1,0 +1,46 @@
+//! What the tracking has to go by at one moment.
+
+use crate::geometry::{Angle, Position, YawFrame};
+use crate::gimbals::capabilities::Capabilities;
+use crate::gimbals::report::GimbalStatus;
+use crate::gimbals::settings::DeviceYawFrame;
+
+/// What the tracking has to go by at one moment.
+#[derive(Clone, Copy, Debug)]
+pub struct Situation<'a> {
+    /// The gimbal's latest attitude, if it is fresh.
+    pub measured: Option<GimbalStatus>,
+    /// The vehicle's heading, as the gimbal or else the autopilot knows it.
+    pub heading: Option<Angle>,
+    /// The vehicle's position, if it is fresh.
+    pub position: Option<Position>,
+    pub capabilities: &'a Capabilities,
+    pub accepts_earth_yaw: bool,
+    pub device_yaw_frame: DeviceYawFrame,
+}
+
+impl Situation<'_> {
+    /// The frame in which the device is told a yaw that is to be held in `frame`.
+    pub(super) fn device_frame(&self, frame: YawFrame) -> YawFrame {
+        match self.device_yaw_frame {
+            DeviceYawFrame::Auto if self.accepts_earth_yaw => frame,
+            DeviceYawFrame::Auto | DeviceYawFrame::Vehicle => YawFrame::Vehicle,
+            DeviceYawFrame::Earth => YawFrame::Earth,
+        }
+    }
+
+    /// Where the gimbal looks now, yaw in `frame`.
+    pub(super) fn measured_pose(&self, frame: YawFrame) -> Option<Pose> {
+        let attitude = self.measured?.attitude;
+        let angles = attitude.angles();
+        let yaw = attitude.yaw().in_frame(frame, self.heading)?.angle();
+        Some(Pose { roll: angles.roll, pitch: angles.pitch, yaw })
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pose {
+    pub(super) roll: Angle,
+    pub(super) pitch: Angle,
+    pub(super) yaw: Angle,
+}
