@@ -29,10 +29,10 @@ impl GimbalManager {
     ) {
         let first_answer = self.outputs.len();
         let outcome = match command.number {
-            command::DO_GIMBAL_MANAGER_CONFIGURE => self.do_gimbal_manager_configure(now, sender.id, command, around),
-            command::DO_GIMBAL_MANAGER_PITCHYAW => self.do_gimbal_manager_pitchyaw(now, sender.id, command, around),
-            command::DO_SET_ROI_LOCATION => self.do_set_roi_location(now, sender.id, command, around),
-            command::DO_SET_ROI_NONE => self.do_set_roi_none(now, sender.id, command, around),
+            command::DO_GIMBAL_MANAGER_CONFIGURE
+            | command::DO_GIMBAL_MANAGER_PITCHYAW
+            | command::DO_SET_ROI_LOCATION
+            | command::DO_SET_ROI_NONE => self.handle_gimbal_command(now, sender.id, command, around),
             command::REQUEST_MESSAGE => self.request_message(now, sender, command),
             command::SET_MESSAGE_INTERVAL => self.set_message_interval(now, sender, command),
             command::GET_MESSAGE_INTERVAL => Ok(self.get_message_interval(sender, command)),
@@ -57,6 +57,34 @@ impl GimbalManager {
         self.outputs.insert(first_answer, ManagerOutput::Reply { to: sender.id, message });
     }
 
+    /// A command about the gimbal itself; all but CONFIGURE pass the gate.
+    fn handle_gimbal_command(
+        &mut self,
+        now: Timestamp,
+        sender: MavId,
+        command: &Command,
+        around: Surroundings<'_>,
+    ) -> Result<Outcome, Refusal> {
+        let id_parameter = match command.number {
+            command::DO_SET_ROI_LOCATION | command::DO_SET_ROI_NONE => 1,
+            _ => 7,
+        };
+        if !self.concerns_us(command.gimbal(id_parameter)?, command)? {
+            return Ok(Outcome::Ignored);
+        }
+        if command.number == command::DO_GIMBAL_MANAGER_CONFIGURE {
+            self.do_gimbal_manager_configure(now, sender, command, around)?;
+            return Ok(Outcome::Accepted);
+        }
+        self.gate(now, sender, around)?;
+        match command.number {
+            command::DO_GIMBAL_MANAGER_PITCHYAW => self.handle_demand(now, sender, &command.pitchyaw()?, around)?,
+            command::DO_SET_ROI_LOCATION => self.do_set_roi_location(now, sender, command, around)?,
+            _ => self.do_set_roi_none(now, sender)?,
+        }
+        Ok(Outcome::Accepted)
+    }
+
     /// Whether a command for device `gimbal` concerns this one: an id that nobody here has is refused to whoever asked
     /// exactly us, and somebody else's business when everybody was asked.
     fn concerns_us(&self, gimbal: u8, command: &Command) -> Result<bool, Refusal> {
@@ -74,10 +102,7 @@ impl GimbalManager {
         sender: MavId,
         command: &Command,
         around: Surroundings<'_>,
-    ) -> Result<Outcome, Refusal> {
-        if !self.concerns_us(command.gimbal(7)?, command)? {
-            return Ok(Outcome::Ignored);
-        }
+    ) -> Result<(), Refusal> {
         if around.other_vehicle {
             return Err(Refusal::denied("other_vehicle"));
         }
@@ -92,22 +117,7 @@ impl GimbalManager {
             tracing::info!(gimbal = self.settings.name, primary, secondary, by = %sender, "control changed");
             self.after_change_of_control(now, before.0);
         }
-        Ok(Outcome::Accepted)
-    }
-
-    fn do_gimbal_manager_pitchyaw(
-        &mut self,
-        now: Timestamp,
-        sender: MavId,
-        command: &Command,
-        around: Surroundings<'_>,
-    ) -> Result<Outcome, Refusal> {
-        if !self.concerns_us(command.gimbal(7)?, command)? {
-            return Ok(Outcome::Ignored);
-        }
-        self.gate(now, sender, around)?;
-        self.handle_demand(now, sender, &command.pitchyaw()?, around)?;
-        Ok(Outcome::Accepted)
+        Ok(())
     }
 
     fn do_set_roi_location(
@@ -116,18 +126,19 @@ impl GimbalManager {
         sender: MavId,
         command: &Command,
         around: Surroundings<'_>,
-    ) -> Result<Outcome, Refusal> {
-        if !self.concerns_us(command.gimbal(1)?, command)? {
-            return Ok(Outcome::Ignored);
-        }
-        self.gate(now, sender, around)?;
+    ) -> Result<(), Refusal> {
         let Some(place) = self.roi_place(now, command, around)? else {
-            return self.do_set_roi_none(now, sender, command, around);
+            return self.do_set_roi_none(now, sender);
         };
         let capabilities = *self.steerable()?;
         let situation = self.situation(now, &capabilities, around);
-        self.tracking.point_at(now, sender, place, &situation)?;
-        Ok(Outcome::Accepted)
+        self.tracking.point_at(now, sender, place, &situation)
+    }
+
+    fn do_set_roi_none(&mut self, now: Timestamp, sender: MavId) -> Result<(), Refusal> {
+        let capabilities = *self.steerable()?;
+        self.tracking.end_roi(now, sender, &capabilities);
+        Ok(())
     }
 
     /// The place to look at, `None` for 0, 0, 0, which by tradition ends it.
@@ -175,22 +186,6 @@ impl GimbalManager {
             0.0
         };
         Ok(Some(Position { latitude_deg: latitude, longitude_deg: longitude, altitude_m: altitude + datum }))
-    }
-
-    fn do_set_roi_none(
-        &mut self,
-        now: Timestamp,
-        sender: MavId,
-        command: &Command,
-        around: Surroundings<'_>,
-    ) -> Result<Outcome, Refusal> {
-        if !self.concerns_us(command.gimbal(1)?, command)? {
-            return Ok(Outcome::Ignored);
-        }
-        self.gate(now, sender, around)?;
-        let capabilities = *self.steerable()?;
-        self.tracking.end_roi(now, sender, &capabilities);
-        Ok(Outcome::Accepted)
     }
 
     fn request_message(&mut self, now: Timestamp, sender: Sender, command: &Command) -> Result<Outcome, Refusal> {

@@ -141,7 +141,10 @@ impl World {
     /// Lets time pass, event by event.
     pub fn run_for(&mut self, duration: Duration) {
         let end = self.now + duration;
+        let mut at_once = 0;
         while let Some(next) = self.next_event().filter(|next| *next <= end) {
+            at_once = if next > self.now { 0 } else { at_once + 1 };
+            assert!(at_once < 1_000, "a timeout that never passes, at {}", self.now);
             self.step_to(next);
         }
         self.now = end;
