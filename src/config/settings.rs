@@ -26,7 +26,7 @@ pub struct DaemonSettings {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct HttpSettings {
     pub listen: SocketAddr,
-    /// Holds the bearer token that allows control; without it HTTP is read-only.
+    /// Holds the bearer token for requests that control a gimbal. HTTP is read-only in this version.
     pub token_file: Option<PathBuf>,
 }
 
