@@ -275,6 +275,11 @@ def body(steps, rig, listener, client):
     steps.run("the daemon is well", rig.daemon.check)
 
 
+def gimbal_knows_heading(client):
+    seen = client.attitudes.since(0)
+    return seen and not math.isnan(seen[-1].yaw_north)
+
+
 def client_frames(client):
     return [Frame(at, message) for at, message in client.heard("GIMBAL_MANAGER_INFORMATION")]
 
@@ -285,7 +290,8 @@ def main():
     def run():
         with Rig("pymavlink-listener", SYSTEM_ID, "ardupilot") as rig, Listener(rig.listener_port) as listener:
             with GroundStation(rig.ground_port, CLIENT[0], SYSTEM_ID) as client:
-                wait_for("the gimbal's attitude", lambda: client.attitudes.since(0), 5)
+                # An ArduPilot does not tell gimbals where it points until somebody asks it to.
+                wait_for("the gimbal told the heading", lambda: gimbal_knows_heading(client), 15)
                 body(steps, rig, listener, client)
 
     steps.script(run)
