@@ -33,7 +33,6 @@ use conflicts::{Conflict, Conflicts};
 use identity::Identity;
 use outbox::Outbox;
 use roster::{GimbalOutput, Roster};
-use sent::SentFrames;
 use settings::{FALLBACK_SYSTEM_ID, Role, Settings};
 use streams::AutopilotStreams;
 
@@ -100,7 +99,6 @@ pub struct Bridge {
     roster: Roster,
     streams: AutopilotStreams,
     conflicts: Conflicts,
-    sent: SentFrames,
     outbox: Outbox,
     buffer: FrameBuffer,
     timers: TimerTable<Timer>,
@@ -126,7 +124,6 @@ impl Bridge {
             roster: Roster::new(&settings),
             streams: AutopilotStreams::default(),
             conflicts: Conflicts::default(),
-            sent: SentFrames::default(),
             outbox: Outbox::default(),
             buffer: FrameBuffer::default(),
             timers: TimerTable::default(),
@@ -466,17 +463,9 @@ impl Bridge {
     }
 
     fn send_as(&mut self, now: Timestamp, system: u8, channels: ChannelSet, component: u8, message: &MavMessage) {
-        let source = MavId::new(system, component);
-        for channel in channels {
-            let Some(state) = self.channels.channel_mut(channel) else { continue };
-            let sequence = state.next_sequence(component);
-            let frame = self.buffer.encode_any(source, sequence, message);
-            if self.channels.limit_rate(now, channel.into(), &frame).is_empty() {
-                continue;
-            }
-            self.sent.note(frame.bytes());
-            self.channels.transmit(now, channel.into(), &frame, &mut self.outbox);
-        }
+        // The number is given where the frame leaves.
+        let frame = self.buffer.encode_any(MavId::new(system, component), 0, message);
+        self.channels.transmit_own(now, channels, &frame, &mut self.outbox);
     }
 
     fn is_own_id(&self, id: MavId) -> bool {

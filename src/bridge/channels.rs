@@ -5,12 +5,14 @@ use std::time::Duration;
 
 use super::LinkIndex;
 use super::outbox::Outbox;
-use super::pacing::SerialQueue;
+use super::pacing::{Departure, Origin, SerialQueue};
+use super::sent::SentFrames;
 use super::settings::{LinkSettings, Role, Transport};
 use crate::channel::{ChannelId, ChannelSet};
 use crate::timestamp::Timestamp;
 use crate::wire::decoder::Patience;
-use crate::wire::{Frame, MavId, StreamDecoder, WireCounters};
+use crate::wire::encoder::renumber;
+use crate::wire::{Frame, MAX_FRAME_LEN, MavId, StreamDecoder, WireCounters};
 
 /// A stream that is no serial line may hold the rest of a frame back for so long.
 const STREAM_PATIENCE: Duration = Duration::from_secs(1);
@@ -27,24 +29,27 @@ pub struct Channel {
     pub decoder: Option<StreamDecoder>,
     pub queue: Option<SerialQueue>,
     pub last_heard: Option<Timestamp>,
-    /// The next sequence number of each of our components.
-    sequences: Vec<(u8, u8)>,
+    sequences: Sequences,
 }
 
-impl Channel {
-    /// The sequence number for a frame that `component` sends on this channel.
-    pub fn next_sequence(&mut self, component: u8) -> u8 {
-        match self.sequences.iter_mut().find(|(id, _)| *id == component) {
-            Some((_, next)) => {
-                let sequence = *next;
-                *next = next.wrapping_add(1);
-                sequence
-            }
+/// The next sequence number of each of our components on one channel.
+#[derive(Debug, Default)]
+struct Sequences(Vec<(u8, u8)>);
+
+impl Sequences {
+    /// Numbers a frame of ours that is about to leave.
+    fn number(&mut self, frame: &mut [u8]) {
+        let component = frame[6];
+        let at = match self.0.iter().position(|(id, _)| *id == component) {
+            Some(at) => at,
             None => {
-                self.sequences.push((component, 1));
-                0
+                self.0.push((component, 0));
+                self.0.len() - 1
             }
-        }
+        };
+        let (_, next) = &mut self.0[at];
+        renumber(frame, *next);
+        *next = next.wrapping_add(1);
     }
 }
 
@@ -118,6 +123,7 @@ pub struct Channels {
     by_role: [ChannelSet; 4],
     /// Channels of links with a `max_rate_hz`.
     limited: ChannelSet,
+    sent: SentFrames,
 }
 
 impl Channels {
@@ -132,6 +138,7 @@ impl Channels {
             paced: ChannelSet::EMPTY,
             by_role: [ChannelSet::EMPTY; 4],
             limited: ChannelSet::EMPTY,
+            sent: SentFrames::default(),
         }
     }
 
@@ -195,7 +202,8 @@ impl Channels {
             self.limited.insert(channel);
         }
         let address = address.to_owned();
-        let channel_state = Channel { link, address, decoder, queue, last_heard: None, sequences: Vec::new() };
+        let channel_state =
+            Channel { link, address, decoder, queue, last_heard: None, sequences: Sequences::default() };
         self.channels[channel.index()] = Some(channel_state);
         true
     }
@@ -242,11 +250,38 @@ impl Channels {
         }
         outbox.push_frame(direct, frame.bytes());
         for channel in paced {
-            if let Some(queue) = self.channels[channel.index()].as_mut().and_then(|channel| channel.queue.as_mut()) {
-                queue.push(now, frame);
-            }
-            self.pump(now, channel, outbox);
+            self.enqueue(now, channel, frame, Origin::Forwarded, outbox);
         }
+    }
+
+    /// Gives a frame of our own out on `wanted`, numbered for each channel.
+    pub fn transmit_own(&mut self, now: Timestamp, wanted: ChannelSet, frame: &Frame<'_>, outbox: &mut Outbox) {
+        for channel in self.limit_rate(now, wanted.intersection(self.open), frame) {
+            if self.paced.contains(channel) {
+                self.enqueue(now, channel, frame, Origin::Own, outbox);
+                continue;
+            }
+            let Some(state) = self.channels[channel.index()].as_mut() else { continue };
+            let mut numbered = [0; MAX_FRAME_LEN];
+            let numbered = &mut numbered[..frame.bytes().len()];
+            numbered.copy_from_slice(frame.bytes());
+            state.sequences.number(numbered);
+            self.sent.note(numbered);
+            self.count_sent(channel, numbered.len());
+            outbox.push_frame(channel.into(), numbered);
+        }
+    }
+
+    /// Whether we sent exactly these bytes lately.
+    pub fn was_sent(&self, frame: &[u8]) -> bool {
+        self.sent.contains(frame)
+    }
+
+    fn enqueue(&mut self, now: Timestamp, channel: ChannelId, frame: &Frame<'_>, origin: Origin, outbox: &mut Outbox) {
+        if let Some(queue) = self.channels[channel.index()].as_mut().and_then(|channel| channel.queue.as_mut()) {
+            queue.push(now, frame, origin);
+        }
+        self.pump(now, channel, outbox);
     }
 
     /// Gives out what the paced lines have room for.
@@ -260,7 +295,11 @@ impl Channels {
         let Some(state) = self.channels[channel.index()].as_mut() else { return };
         let Some(queue) = state.queue.as_mut() else { return };
         let link = &mut self.links[state.link];
-        while let Some(bytes) = queue.pop(now) {
+        while let Some(Departure { bytes, origin }) = queue.pop(now) {
+            if origin == Origin::Own {
+                state.sequences.number(bytes);
+                self.sent.note(bytes);
+            }
             link.tx_frames += 1;
             link.tx_bytes += bytes.len() as u64;
             outbox.push_frame(channel.into(), bytes);

@@ -25,7 +25,7 @@ impl Bridge {
         let ours = self.is_own_id(source);
         if ours {
             // R13: what we sent ourselves and came back is dropped; what another sends under our name is forwarded.
-            if self.sent.contains(frame.bytes()) {
+            if self.channels.was_sent(frame.bytes()) {
                 self.count_dropped(link, "loop");
                 return;
             }

@@ -105,13 +105,32 @@ struct Slot {
     bytes: [u8; MAX_FRAME_LEN],
     len: usize,
     key: Option<ReplaceKey>,
+    origin: Origin,
     queued_at: Timestamp,
+}
+
+/// Whose frame it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Origin {
+    /// Somebody else's, to be sent as it came.
+    Forwarded,
+    /// Ours. It is numbered when it leaves: those it overtakes, and those that give way to newer ones, must leave no
+    /// gap in the numbers.
+    Own,
+}
+
+/// A frame whose turn it is.
+#[derive(Debug)]
+pub struct Departure<'a> {
+    pub bytes: &'a mut [u8],
+    pub origin: Origin,
 }
 
 impl SerialQueue {
     /// `baud` in bits per second, ten bits to the byte.
     pub fn new(baud: u32) -> Self {
-        let empty = Slot { bytes: [0; MAX_FRAME_LEN], len: 0, key: None, queued_at: Timestamp::ZERO };
+        let (origin, queued_at) = (Origin::Forwarded, Timestamp::ZERO);
+        let empty = Slot { bytes: [0; MAX_FRAME_LEN], len: 0, key: None, origin, queued_at };
         Self {
             nanos_per_byte: (1e10 / (f64::from(baud.max(1)) * FILL)) as u64,
             line_free_at: Timestamp::ZERO,
@@ -122,13 +141,13 @@ impl SerialQueue {
         }
     }
 
-    pub fn push(&mut self, now: Timestamp, frame: &Frame<'_>) {
+    pub fn push(&mut self, now: Timestamp, frame: &Frame<'_>, origin: Origin) {
         let (priority, key) = classify(frame);
         let queue = priority as usize;
         let same = |slot: &u8| key.is_some() && self.slots[usize::from(*slot)].key == key;
         if let Some(slot) = self.waiting[queue].iter().copied().find(same) {
             self.count(REPLACED);
-            self.fill(slot, now, frame, key);
+            self.fill(slot, now, frame, key, origin);
             return;
         }
         if self.waiting[queue].len() >= MAX_WAITING[queue] {
@@ -138,21 +157,21 @@ impl SerialQueue {
             self.drop_oldest(least_urgent.expect("the slots that are not free wait in some queue"));
         }
         let slot = self.free.pop().expect("one was free or has just become so");
-        self.fill(slot, now, frame, key);
+        self.fill(slot, now, frame, key, origin);
         self.waiting[queue].push_back(slot);
     }
 
     /// The next frame, if the wire is free for one.
-    pub fn pop(&mut self, now: Timestamp) -> Option<&[u8]> {
+    pub fn pop(&mut self, now: Timestamp) -> Option<Departure<'_>> {
         if self.line_free_at > now + LEAD {
             return None;
         }
         let slot = self.next_fresh(now)?;
         self.free.push(slot);
-        let slot = &self.slots[usize::from(slot)];
+        let slot = &mut self.slots[usize::from(slot)];
         let wire_time = Duration::from_nanos(self.nanos_per_byte * slot.len as u64);
         self.line_free_at = self.line_free_at.max(now) + wire_time;
-        Some(&slot.bytes[..slot.len])
+        Some(Departure { bytes: &mut slot.bytes[..slot.len], origin: slot.origin })
     }
 
     /// When [`pop`](Self::pop) will have a frame, `None` when nothing waits.
@@ -197,12 +216,13 @@ impl SerialQueue {
         }
     }
 
-    fn fill(&mut self, slot: u8, now: Timestamp, frame: &Frame<'_>, key: Option<ReplaceKey>) {
+    fn fill(&mut self, slot: u8, now: Timestamp, frame: &Frame<'_>, key: Option<ReplaceKey>, origin: Origin) {
         let slot = &mut self.slots[usize::from(slot)];
         let bytes = frame.bytes();
         slot.bytes[..bytes.len()].copy_from_slice(bytes);
         slot.len = bytes.len();
         slot.key = key;
+        slot.origin = origin;
         slot.queued_at = now;
     }
 
@@ -225,7 +245,7 @@ mod tests {
         for millis in 0..1_000 {
             let now = Timestamp::from_millis(millis);
             push(&mut queue, now, &attitude(millis as u8));
-            while let Some(bytes) = queue.pop(now) {
+            while let Some(bytes) = pop(&mut queue, now) {
                 sent += bytes.len();
             }
         }
@@ -240,10 +260,10 @@ mod tests {
         push(&mut queue, Timestamp::ZERO, &attitude(1));
         push(&mut queue, Timestamp::ZERO, &ack(7));
 
-        assert_eq!(queue.pop(Timestamp::ZERO), Some(&ack(7)[..]));
-        assert_eq!(queue.pop(Timestamp::ZERO), None);
+        assert_eq!(pop(&mut queue, Timestamp::ZERO), Some(ack(7)));
+        assert_eq!(pop(&mut queue, Timestamp::ZERO), None);
         let free = queue.poll_timeout().expect("telemetry waits");
-        assert_eq!(queue.pop(free), Some(&attitude(0)[..]));
+        assert_eq!(pop(&mut queue, free), Some(attitude(0)));
     }
 
     /// "the newest setpoint replaces the queued one".
@@ -253,7 +273,7 @@ mod tests {
         push(&mut queue, Timestamp::ZERO, &setpoint(1, 0.1));
         push(&mut queue, Timestamp::ZERO, &setpoint(2, 0.2));
 
-        assert_eq!(queue.pop(Timestamp::ZERO), Some(&setpoint(2, 0.2)[..]));
+        assert_eq!(pop(&mut queue, Timestamp::ZERO), Some(setpoint(2, 0.2)));
         assert_eq!(queue.poll_timeout(), None);
         assert_eq!(queue.dropped(), &BTreeMap::from([(REPLACED, 1)]));
     }
@@ -265,7 +285,7 @@ mod tests {
         push(&mut queue, Timestamp::ZERO, &attitude(0));
         push(&mut queue, Timestamp::from_millis(290), &attitude(1));
 
-        assert_eq!(queue.pop(Timestamp::from_millis(301)), Some(&attitude(1)[..]));
+        assert_eq!(pop(&mut queue, Timestamp::from_millis(301)), Some(attitude(1)));
         assert_eq!(queue.dropped(), &BTreeMap::from([(STALE, 1)]));
     }
 
@@ -275,7 +295,7 @@ mod tests {
         let mut queue = SerialQueue::new(57_600);
         push(&mut queue, Timestamp::ZERO, &ack(1));
         queue.clear();
-        assert_eq!(queue.pop(Timestamp::from_secs(1)), None);
+        assert_eq!(pop(&mut queue, Timestamp::from_secs(1)), None);
         assert_eq!(queue.dropped(), &BTreeMap::from([(LINK_DOWN, 1)]));
     }
 
@@ -307,13 +327,17 @@ mod tests {
     fn drain(queue: &mut SerialQueue) -> Vec<Vec<u8>> {
         let mut sent = Vec::new();
         while let Some(at) = queue.poll_timeout() {
-            sent.extend(queue.pop(at).map(<[u8]>::to_vec));
+            sent.extend(pop(queue, at));
         }
         sent
     }
 
+    fn pop(queue: &mut SerialQueue, now: Timestamp) -> Option<Vec<u8>> {
+        queue.pop(now).map(|departure| departure.bytes.to_vec())
+    }
+
     fn push(queue: &mut SerialQueue, now: Timestamp, bytes: &[u8]) {
-        queue.push(now, &DatagramFrames::new(bytes).next_frame().expect("one frame"));
+        queue.push(now, &DatagramFrames::new(bytes).next_frame().expect("one frame"), Origin::Forwarded);
     }
 
     fn attitude(sequence: u8) -> Vec<u8> {

@@ -44,7 +44,33 @@ impl FrameBuffer {
     }
 }
 
+/// Gives an unsigned MAVLink 2 frame of a known message another sequence number, and the checksum that goes with it.
+pub fn renumber(frame: &mut [u8], sequence: u8) {
+    frame[4] = sequence;
+    let header = Header::read(frame).expect("a whole frame was given");
+    let shape = header.shape.expect("a message of our own is known");
+    let end = header.payload_end();
+    let crc = Crc::new().add(&frame[1..end]).finish(shape.crc_extra);
+    frame[end..end + 2].copy_from_slice(&crc.to_le_bytes());
+}
+
 /// Encodes `message` into a new vector, for tests and simulators.
 pub fn encode_to_vec<M: MessageData>(source: MavId, sequence: u8, message: &M) -> Vec<u8> {
     FrameBuffer::default().encode(source, sequence, message).bytes().to_vec()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::dialect::MESSAGE_INTERVAL_DATA;
+
+    #[test]
+    fn a_renumbered_frame_is_the_frame_of_that_number() {
+        let message = MESSAGE_INTERVAL_DATA { interval_us: 200_000, message_id: 281 };
+        let mut frame = encode_to_vec(MavId::new(1, 191), 7, &message);
+
+        renumber(&mut frame, 200);
+
+        assert_eq!(frame, encode_to_vec(MavId::new(1, 191), 200, &message));
+    }
 }

@@ -263,6 +263,25 @@ fn item_24_sequence_numbers_have_no_gap_on_any_link() {
     }
 }
 
+/// Also on a full serial line, where setpoints give way to newer ones and control overtakes the rest.
+#[test]
+fn item_24_sequence_numbers_have_no_gap_on_a_full_serial_line() {
+    let mut settings = three_links();
+    settings.links[1].transport = Transport::Serial { baud: 9_600 };
+    let (mut world, places) = World::with_one_gimbal(settings);
+    let demands = [pitchyaw(-10.0, 0.0, NAN, NAN, 44.0), pitchyaw(-20.0, 5.0, NAN, NAN, 44.0)];
+    for demand in demands.iter().cycle().take(400) {
+        world.send(places.ground, GCS, demand);
+        world.run_for(SECOND / 50);
+    }
+
+    assert!(world.snapshot().links[1].dropped["replaced_by_newer"] > 100, "setpoints gave way");
+    let arrivals = world.take(places.gimbal);
+    let sequences: Vec<u8> = own(&arrivals).map(|arrival| arrival.bytes[4]).collect();
+    assert!(sequences.len() > 100);
+    assert!(sequences.windows(2).all(|pair| pair[1] == pair[0].wrapping_add(1)), "{sequences:?}");
+}
+
 /// D1: "one component per gimbal, type ONBOARD_CONTROLLER (18) … 191 always beats, the others from when their gimbal is
 /// known. A request to 191 concerns its gimbal only; a request to component 0 concerns all."
 #[test]
