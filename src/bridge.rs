@@ -153,6 +153,8 @@ impl Bridge {
             }
             Input::ChannelOpened { channel, link, address } => self.open_channel(now, channel, link, address),
             Input::ChannelClosed { channel } => self.close_channel(channel),
+            // At the end nobody is listened to any more: no demand may follow the one that stops the gimbal.
+            Input::Received { .. } if self.shutting_down => {}
             Input::Received { channel, bytes } => self.handle_received(now, channel, bytes),
             Input::SendFailed { channel, frames, reason } => {
                 for _ in 0..frames {
@@ -355,7 +357,7 @@ impl Bridge {
             _ => {}
         }
         let has_gimbal_of_ours = self.roster.iter().filter_map(|gimbal| gimbal.manager.device()).any(|device| {
-            let channels = self.router.routes().component_channels(device);
+            let channels = self.channels_of_device(device);
             !channels.is_empty() && channels.intersection(self.channels.with_role(Role::Autopilot)).is_empty()
         });
         self.streams.set_needed(message::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE, has_gimbal_of_ours);
@@ -452,7 +454,7 @@ impl Bridge {
     }
 
     fn channels_of_device(&self, device: MavId) -> ChannelSet {
-        self.router.routes().component_channels(device)
+        self.roster.channel_of(device).map_or(ChannelSet::EMPTY, ChannelSet::from)
     }
 
     /// Sends a message of our own, numbered for each channel.

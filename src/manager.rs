@@ -182,7 +182,14 @@ impl GimbalManager {
     /// News from the driver.
     pub fn handle_report(&mut self, now: Timestamp, report: Report, around: Surroundings<'_>) {
         match report {
+            Report::Restarted => {
+                self.tracking.forget();
+                tracing::info!(gimbal = self.settings.name, "gimbal restarted");
+            }
             Report::Alive { device } => {
+                if self.device != Some(device) {
+                    self.tracking.forget();
+                }
                 self.device = Some(device);
                 self.state = DeviceState::Alive;
                 tracing::info!(gimbal = self.settings.name, %device, "gimbal found");

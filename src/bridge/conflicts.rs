@@ -24,6 +24,8 @@ pub enum Conflict {
     OwnIdInUse { id: MavId },
     /// More than one autopilot on autopilot links while the system id is to be found out.
     SeveralAutopilots,
+    /// A component on another channel has the id of a gimbal of ours.
+    DeviceElsewhere { device: MavId },
     /// The autopilot has another system id than the configuration names.
     AutopilotElsewhere { autopilot: MavId, system: u8 },
     /// A gimbal on another system id than the vehicle's.
@@ -67,6 +69,10 @@ impl Conflict {
             Self::SeveralAutopilots => "several autopilots were heard on autopilot links. Set [vehicle] system_id to \
                                         the one this gimbal belongs to."
                 .to_owned(),
+            Self::DeviceElsewhere { device } => format!(
+                "{device} is heard in two places; the gimbal is where it was heard first. If there are two gimbals, give \
+                 one of them another component id; if not, something sends its frames back."
+            ),
             Self::AutopilotElsewhere { autopilot, system } => format!(
                 "the autopilot sends as {autopilot}, but [vehicle] system_id is {system}. Set it to \"auto\" or to {}.",
                 autopilot.system

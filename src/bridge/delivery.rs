@@ -6,7 +6,7 @@ use super::{Bridge, LinkIndex};
 use crate::channel::{ChannelId, ChannelSet};
 use crate::manager::request::read_request;
 use crate::manager::settings::Firewall;
-use crate::manager::{Sender, Surroundings};
+use crate::manager::{DeviceState, Sender, Surroundings};
 use crate::timestamp::Timestamp;
 use crate::wire::dialect::{
     GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA, GIMBAL_MANAGER_INFORMATION_DATA,
@@ -52,7 +52,7 @@ impl Bridge {
             self.note_answer(frame);
         }
         if !ours {
-            self.handle_device(now, link, role, frame);
+            self.handle_device(now, from, link, role, frame);
         }
         self.handle_for_us(now, from, frame);
         self.forward(now, from, link, frame);
@@ -91,10 +91,17 @@ impl Bridge {
     }
 
     /// Frames of gimbals: to their driver, or the first sign of a new one.
-    fn handle_device(&mut self, now: Timestamp, link: LinkIndex, role: Role, frame: &Frame<'_>) {
+    fn handle_device(&mut self, now: Timestamp, from: ChannelId, link: LinkIndex, role: Role, frame: &Frame<'_>) {
         let source = frame.source();
         if let Some(gimbal) = self.roster.of_device(source) {
-            gimbal.driver.handle_received(now, frame);
+            if gimbal.channel != Some(from) && gimbal.manager.state() == DeviceState::Lost {
+                gimbal.channel = Some(from);
+            }
+            if gimbal.channel == Some(from) {
+                gimbal.driver.handle_received(now, frame);
+            } else if frame.message_id() == message::HEARTBEAT {
+                self.conflicts.note(now, Conflict::DeviceElsewhere { device: source });
+            }
             return;
         }
         let Some(system) = self.identity.system() else { return };
@@ -121,7 +128,7 @@ impl Bridge {
         if source.system != system {
             self.conflicts.note(now, Conflict::ForeignSystem { device: source, system });
         }
-        match self.roster.adopt(now, source, link) {
+        match self.roster.adopt(now, source, link, from) {
             Ok(gimbal) => gimbal.driver.handle_received(now, frame),
             Err(_) => self.conflicts.note(now, Conflict::NoManagerLeft { device: source }),
         }
@@ -253,9 +260,9 @@ impl Bridge {
     /// Where the managed devices are that `target` includes.
     fn channels_of_devices(&self, target: Target) -> ChannelSet {
         let devices = self.roster.iter().filter_map(|gimbal| gimbal.manager.device());
-        devices
-            .filter(|device| target.includes(*device))
-            .fold(ChannelSet::EMPTY, |channels, device| channels.union(self.router.routes().component_channels(device)))
+        devices.filter(|device| target.includes(*device)).fold(ChannelSet::EMPTY, |channels, device| {
+            channels.union(self.channels_of_device(device)).union(self.router.routes().component_channels(device))
+        })
     }
 
     /// Keeps from managed devices what others send straight to them, and on its link what a device sends as a manager.

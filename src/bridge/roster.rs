@@ -22,6 +22,8 @@ pub struct Gimbal {
     pub driver: Box<dyn GimbalDriver>,
     /// The component that the driver talks to, from the first sign of it on.
     pub adopted: Option<MavId>,
+    /// Where that one is; others under its id elsewhere are not it. `None` while its channel is closed.
+    pub channel: Option<ChannelId>,
     /// The manager's component id.
     pub component: u8,
     /// It has an entry in the configuration, and is missed when it is not there.
@@ -34,6 +36,7 @@ impl Gimbal {
             manager: GimbalManager::new(settings, rules.clone()),
             driver: Box::new(MavlinkV2Driver::new()),
             adopted: None,
+            channel: None,
             component,
             configured,
         }
@@ -122,16 +125,26 @@ impl Roster {
         }
     }
 
+    /// A gimbal there is lost at once.
     pub fn close_channel(&mut self, channel: ChannelId) {
         self.open.remove(channel);
         for gimbal in &mut self.gimbals {
             gimbal.manager.close_channel(channel);
+            if gimbal.channel == Some(channel) {
+                gimbal.channel = None;
+                gimbal.driver.handle_link_lost();
+            }
         }
     }
 
     /// The gimbal whose device that is.
     pub fn of_device(&mut self, device: MavId) -> Option<&mut Gimbal> {
         self.gimbals.iter_mut().find(|gimbal| gimbal.adopted == Some(device))
+    }
+
+    /// The channel of a managed device.
+    pub fn channel_of(&self, device: MavId) -> Option<ChannelId> {
+        self.gimbals.iter().find(|gimbal| gimbal.adopted == Some(device))?.channel
     }
 
     /// Whether `id` is a managed device.
@@ -144,40 +157,63 @@ impl Roster {
         self.gimbals.iter().any(|gimbal| gimbal.component == component)
     }
 
-    /// The gimbal for a device heard on `link`, which is given to its driver; new ones are made as they are needed.
-    pub fn adopt(&mut self, now: Timestamp, device: MavId, link: LinkIndex) -> Result<&mut Gimbal, NoManagerLeft> {
-        let at = match self.place_for(device, link) {
+    /// The gimbal for a device heard on a channel of `link`, which is given to its driver; new ones are made as they
+    /// are needed.
+    pub fn adopt(
+        &mut self,
+        now: Timestamp,
+        device: MavId,
+        link: LinkIndex,
+        channel: ChannelId,
+    ) -> Result<&mut Gimbal, NoManagerLeft> {
+        let at = match self.place_for(device, link, channel) {
             Some(at) => at,
-            None => {
-                let component = self.free_manager(device).ok_or(NoManagerLeft)?;
-                let settings = GimbalSettings::found(format!("gimbal-{}", device.component));
-                let mut gimbal = Gimbal::new(settings, &self.rules, component, false);
-                for channel in self.open {
-                    gimbal.manager.open_channel(now, channel);
-                }
-                self.gimbals.push(gimbal);
-                self.gimbals.len() - 1
-            }
+            None => self.make_place(now, device)?,
         };
-        self.gimbals[at].driver.adopt(now, device);
-        self.gimbals[at].adopted = Some(device);
-        Ok(&mut self.gimbals[at])
+        let gimbal = &mut self.gimbals[at];
+        gimbal.driver.adopt(now, device);
+        gimbal.adopted = Some(device);
+        gimbal.channel = Some(channel);
+        Ok(gimbal)
     }
 
-    fn place_for(&self, device: MavId, link: LinkIndex) -> Option<usize> {
+    fn place_for(&self, device: MavId, link: LinkIndex, channel: ChannelId) -> Option<usize> {
         let fits = |gimbal: &Gimbal| {
-            let settings = gimbal.manager.settings();
-            let free = gimbal.adopted.is_none()
-                || (gimbal.manager.state() == DeviceState::Lost && settings.component_id == Some(device.component));
-            free && settings.link.is_none_or(|wanted| wanted == link)
+            // A device with another system id is the one we had, if it speaks from the same place or that one is lost.
+            let free = gimbal.adopted.is_none_or(|known| {
+                let gone = gimbal.manager.state() == DeviceState::Lost || gimbal.channel == Some(channel);
+                known.component == device.component && gone
+            });
+            free && gimbal.manager.settings().link.is_none_or(|wanted| wanted == link)
         };
         let named = |gimbal: &Gimbal| gimbal.manager.settings().component_id == Some(device.component);
         let unnamed = |gimbal: &Gimbal| gimbal.configured && gimbal.manager.settings().component_id.is_none();
-        let spare =
-            |gimbal: &Gimbal| !gimbal.configured && manager_of_device(device.component) == Some(gimbal.component);
+        let found = |gimbal: &Gimbal| {
+            let again = gimbal.adopted.is_some_and(|known| known.component == device.component);
+            !gimbal.configured && (again || manager_of_device(device.component) == Some(gimbal.component))
+        };
         let position =
             |wanted: &dyn Fn(&Gimbal) -> bool| self.gimbals.iter().position(|gimbal| fits(gimbal) && wanted(gimbal));
-        position(&named).or_else(|| position(&unnamed)).or_else(|| position(&spare))
+        position(&named).or_else(|| position(&unnamed)).or_else(|| position(&found))
+    }
+
+    /// A new gimbal, in the place of one that was only found and is lost when no manager is left.
+    fn make_place(&mut self, now: Timestamp, device: MavId) -> Result<usize, NoManagerLeft> {
+        let lost = |gimbal: &Gimbal| !gimbal.configured && gimbal.manager.state() == DeviceState::Lost;
+        let (at, component) = match self.free_manager(device) {
+            Some(component) => (self.gimbals.len(), component),
+            None => {
+                let at = self.gimbals.iter().position(lost).ok_or(NoManagerLeft)?;
+                (at, self.gimbals.remove(at).component)
+            }
+        };
+        let settings = GimbalSettings::found(format!("gimbal-{}", device.component));
+        let mut gimbal = Gimbal::new(settings, &self.rules, component, false);
+        for channel in self.open {
+            gimbal.manager.open_channel(now, channel);
+        }
+        self.gimbals.insert(at, gimbal);
+        Ok(at)
     }
 
     /// The manager component for a device without an entry.
@@ -226,9 +262,10 @@ mod tests {
     #[test]
     fn found_devices_take_the_manager_of_their_id() {
         let mut roster = Roster::new(&Settings::default());
+        let channel = ChannelId::new(0).expect("below the bound");
         let component = |roster: &mut Roster, device: u8| {
             let device = MavId::new(1, device);
-            roster.adopt(Timestamp::ZERO, device, 0).map(|gimbal| gimbal.component)
+            roster.adopt(Timestamp::ZERO, device, 0, channel).map(|gimbal| gimbal.component)
         };
         assert_eq!(component(&mut roster, 171), Ok(192));
         assert_eq!(component(&mut roster, 154), Ok(191));

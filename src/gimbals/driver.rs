@@ -16,6 +16,9 @@ pub trait GimbalDriver: std::fmt::Debug {
     /// A frame that the device sent.
     fn handle_received(&mut self, now: Timestamp, frame: &Frame<'_>);
 
+    /// The link to the device is gone, and the device with it.
+    fn handle_link_lost(&mut self);
+
     /// An order, in a yaw frame that the device accepts.
     fn handle_setpoint(&mut self, now: Timestamp, setpoint: Setpoint);
 

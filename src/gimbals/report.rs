@@ -12,6 +12,8 @@ pub enum Report {
     Alive {
         device: MavId,
     },
+    /// It was restarted, and does not do any more what it was told before.
+    Restarted,
     /// Enough is known of the device to steer it, or something of that has changed.
     Known(Identity, Capabilities),
     Attitude(GimbalStatus),

@@ -109,6 +109,7 @@ impl MavlinkV2Driver {
         if before.is_some_and(|before| before.wrapping_sub(boot_ms) > REBOOT_STEP_MS && boot_ms < before) {
             self.fills_delta_yaw = false;
             self.rate_asked = false;
+            self.outputs.push_back(DriverOutput::Report(Report::Restarted));
             self.ask_anew(now);
         }
     }
@@ -235,6 +236,13 @@ impl GimbalDriver for MavlinkV2Driver {
             _ => {}
         }
         self.handle_timeout(now);
+    }
+
+    fn handle_link_lost(&mut self) {
+        self.timers.cancel(Timer::Lost);
+        if self.alive {
+            self.lose();
+        }
     }
 
     fn handle_setpoint(&mut self, _now: Timestamp, setpoint: Setpoint) {
