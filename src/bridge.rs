@@ -94,8 +94,8 @@ pub struct Bridge {
     vehicle: Vehicle,
     /// The autopilot of our system, once it was heard.
     autopilot: Option<MavId>,
-    /// By system, the component that beats as its autopilot.
-    vehicles: Vec<Option<u8>>,
+    /// By system, the component that beats as its autopilot, and when it last did.
+    vehicles: Vec<Option<(u8, Timestamp)>>,
     roster: Roster,
     streams: AutopilotStreams,
     conflicts: Conflicts,
@@ -292,7 +292,7 @@ impl Bridge {
         self.autopilot = None;
         self.vehicle = Vehicle::new();
         if let Some(system) = system
-            && let Some(component) = self.vehicles[usize::from(system)]
+            && let Some((component, _)) = self.vehicles[usize::from(system)]
         {
             self.take_autopilot(now, MavId::new(system, component));
         }

@@ -115,6 +115,11 @@ pub struct GimbalManager {
     tracking: Tracking,
     status_schedule: Schedule,
     information_schedule: Schedule,
+    /// When whose demand is being carried out was last heard.
+    source_heard: Timestamp,
+    /// What the gimbal's idea of the vehicle's heading has more than the autopilot's; carries over the time when the
+    /// gimbal does not tell it, so that the camera stays where it is.
+    heading_bias: Angle,
     /// When the primary last made a demand.
     primary_demand: Option<Timestamp>,
     /// The flags that the last 281 carried.
@@ -137,6 +142,8 @@ impl GimbalManager {
             control: Control::default(),
             status_schedule: Schedule::new(Interval::Every(DEFAULT_STATUS_INTERVAL)),
             information_schedule: Schedule::new(Interval::Off),
+            source_heard: Timestamp::ZERO,
+            heading_bias: Angle::ZERO,
             primary_demand: None,
             told_flags: GimbalFlags::empty(),
             rejected: BTreeMap::new(),
@@ -184,11 +191,13 @@ impl GimbalManager {
         match report {
             Report::Restarted => {
                 self.tracking.forget();
+                self.heading_bias = Angle::ZERO;
                 tracing::info!(gimbal = self.settings.name, "gimbal restarted");
             }
             Report::Alive { device } => {
                 if self.device != Some(device) {
                     self.tracking.forget();
+                    self.heading_bias = Angle::ZERO;
                 }
                 self.device = Some(device);
                 self.state = DeviceState::Alive;
@@ -206,7 +215,12 @@ impl GimbalManager {
                     }
                 }
             }
-            Report::Attitude(status) => self.status = Some((now, status)),
+            Report::Attitude(status) => {
+                if let (Some(of_gimbal), Some(of_vehicle)) = (status.heading, around.vehicle.heading(now)) {
+                    self.heading_bias = (of_gimbal - of_vehicle).wrapped();
+                }
+                self.status = Some((now, status));
+            }
             Report::Lost => {
                 self.state = DeviceState::Lost;
                 self.status = None;
@@ -220,13 +234,20 @@ impl GimbalManager {
     /// Something was heard from `id`, which keeps its control alive.
     pub fn handle_heard(&mut self, now: Timestamp, id: MavId) {
         self.control.handle_heard(now, id);
+        if self.tracking.source() == Some(id) {
+            self.source_heard = now;
+        }
     }
 
     pub fn handle_timeout(&mut self, now: Timestamp, around: Surroundings<'_>) {
-        let primary = self.control.primary();
+        let before = self.holders();
         if self.control.handle_timeout(now, self.rules.lease_timeout) {
             tracing::info!(gimbal = self.settings.name, "control lapsed: its holder is silent");
-            self.after_change_of_control(now, primary);
+            self.after_change_of_control(now, before);
+        }
+        if self.source_lost_at().is_some_and(|at| at <= now) {
+            tracing::info!(gimbal = self.settings.name, "rotation stopped: who asked for it is silent");
+            self.tracking.stop_rates(now);
         }
         let due = self.status_schedule.take_due(now);
         if !due.is_empty()
@@ -248,7 +269,8 @@ impl GimbalManager {
         let schedules = [self.status_schedule.poll_timeout(), self.information_schedule.poll_timeout()];
         // Without a device there is nothing to tell of.
         let schedules = schedules.into_iter().flatten().filter(|_| self.device.is_some());
-        let rest = [self.tracking.poll_timeout(), self.control.poll_timeout(self.rules.lease_timeout)];
+        let lease = self.rules.lease_timeout;
+        let rest = [self.tracking.poll_timeout(), self.control.poll_timeout(lease), self.source_lost_at()];
         schedules.chain(rest.into_iter().flatten()).min()
     }
 
@@ -264,9 +286,12 @@ impl GimbalManager {
 
     /// The autopilot's system id has changed: places held under the old one are void.
     pub fn forget_system(&mut self, now: Timestamp, system: u8, around: Surroundings<'_>) {
-        let primary = self.control.primary();
+        let before = self.holders();
         if self.control.forget_system(system) {
-            self.after_change_of_control(now, primary);
+            self.after_change_of_control(now, before);
+        }
+        if self.tracking.source().is_some_and(|source| source.system == system) {
+            self.tracking.stop_rates(now);
         }
         self.carry_out(now, around);
     }
@@ -375,6 +400,7 @@ impl GimbalManager {
         let situation = self.situation(now, &capabilities, around);
         let timeouts = self.timeouts();
         self.tracking.demand(now, sender, &demand, &situation, timeouts)?;
+        self.source_heard = now;
         if self.control.primary() == Some(sender) {
             self.primary_demand = Some(now);
         }
@@ -408,9 +434,10 @@ impl GimbalManager {
 
     fn situation<'a>(&self, now: Timestamp, capabilities: &'a Capabilities, around: Surroundings<'_>) -> Situation<'a> {
         let status = self.status.filter(|(at, _)| now.since(*at) <= ATTITUDE_STALE).map(|(_, status)| status);
+        let of_vehicle = || around.vehicle.heading(now).map(|heading| (heading + self.heading_bias).wrapped());
         Situation {
             measured: status,
-            heading: status.and_then(|status| status.heading).or(around.vehicle.heading(now)),
+            heading: status.and_then(|status| status.heading).or_else(of_vehicle),
             position: around.vehicle.position(now),
             capabilities,
             accepts_earth_yaw: self.status.is_some_and(|(_, status)| status.accepts_earth_yaw),
@@ -440,12 +467,28 @@ impl GimbalManager {
         }
     }
 
-    fn after_change_of_control(&mut self, now: Timestamp, primary_before: Option<MavId>) {
-        if self.control.primary() != primary_before {
-            self.tracking.stop_rates(now);
+    /// Who holds primary and secondary control.
+    fn holders(&self) -> [Option<MavId>; 2] {
+        [self.control.primary(), self.control.secondary()]
+    }
+
+    /// Rates end with the control of who asked for them, and with every change of the primary.
+    fn after_change_of_control(&mut self, now: Timestamp, before: [Option<MavId>; 2]) {
+        let after = self.holders();
+        let source = self.tracking.source();
+        let source_lost_its_place = source.is_some() && before.contains(&source) && !after.contains(&source);
+        if after[0] != before[0] {
             self.primary_demand = None;
         }
+        if after[0] != before[0] || source_lost_its_place {
+            self.tracking.stop_rates(now);
+        }
         self.broadcast_status(now);
+    }
+
+    /// When a rotation ends because who asked for it was not heard for the lease, however long its rate may last.
+    fn source_lost_at(&self) -> Option<Timestamp> {
+        self.tracking.is_rotating().then(|| self.source_heard + self.rules.lease_timeout)
     }
 
     /// 280, once the gimbal is known.

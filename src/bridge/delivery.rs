@@ -1,8 +1,10 @@
 //! What becomes of a received frame: noted, acted on, forwarded.
 
+use std::time::Duration;
+
 use super::conflicts::Conflict;
 use super::settings::Role;
-use super::{Bridge, LinkIndex};
+use super::{Bridge, LinkIndex, surroundings};
 use crate::channel::{ChannelId, ChannelSet};
 use crate::manager::request::read_request;
 use crate::manager::settings::Firewall;
@@ -14,6 +16,9 @@ use crate::wire::dialect::{
 };
 use crate::wire::ids::{command, component, mav_autopilot, mav_type, message};
 use crate::wire::{Frame, MavId, Target};
+
+/// A system whose autopilot was not heard for so long is not taken for a vehicle any more.
+const VEHICLE_GONE: Duration = Duration::from_secs(10);
 
 impl Bridge {
     /// One checked frame from `from`.
@@ -67,10 +72,11 @@ impl Bridge {
         if !is_autopilot || source.system == 0 {
             return;
         }
+        let was_known = self.is_vehicle(now, source.system);
         let known = &mut self.vehicles[usize::from(source.system)];
-        if known.is_none() || source.component == component::AUTOPILOT1 {
-            *known = Some(source.component);
-        }
+        let component = known.map_or(source.component, |(component, _)| component);
+        let better = source.component == component::AUTOPILOT1;
+        *known = Some((if better { source.component } else { component }, now));
         if role == Role::Autopilot {
             self.identity.handle_autopilot(now, source.system);
         }
@@ -79,6 +85,13 @@ impl Bridge {
         if source.system != system {
             if role == Role::Autopilot && self.identity.is_fixed() {
                 self.conflicts.note(now, Conflict::AutopilotElsewhere { autopilot: source, system });
+            }
+            if !was_known {
+                // D5: what it had taken before it was known as another vehicle is void.
+                let around = surroundings(&self.vehicle, self.autopilot);
+                for gimbal in self.roster.iter_mut() {
+                    gimbal.manager.forget_system(now, source.system, around);
+                }
             }
             return;
         }
@@ -155,7 +168,7 @@ impl Bridge {
         }
         let Some(request) = read_request(frame) else { return };
         let sender = Sender { id: frame.source(), channel: from };
-        let other_vehicle = self.is_other_vehicle(sender.id);
+        let other_vehicle = self.is_other_vehicle(now, sender.id);
         let around = Surroundings { vehicle: &self.vehicle, autopilot: self.autopilot, overheard, other_vehicle };
         for gimbal in self.roster.iter_mut().filter(|gimbal| for_us(gimbal.component)) {
             match &request {
@@ -198,7 +211,7 @@ impl Bridge {
         }
         let gimbals = channels.intersection(self.channels.with_role(Role::Gimbal));
         if !gimbals.is_empty() {
-            let barred = gimbals.without(self.passing_to_gimbals(frame, gimbals));
+            let barred = gimbals.without(self.passing_to_gimbals(now, frame, gimbals));
             channels = self.drop_towards(channels, barred, "not_for_gimbal");
         }
         channels = self.channels.limit_rate(now, channels, frame);
@@ -213,9 +226,14 @@ impl Bridge {
         channels.without(dropped)
     }
 
+    /// Whether an autopilot of that system was heard lately.
+    fn is_vehicle(&self, now: Timestamp, system: u8) -> bool {
+        self.vehicles[usize::from(system)].is_some_and(|(_, heard)| now.since(heard) < VEHICLE_GONE)
+    }
+
     /// D5: whether `id` is in a system that has an autopilot and is not ours.
-    fn is_other_vehicle(&self, id: MavId) -> bool {
-        Some(id.system) != self.identity.system() && self.vehicles[usize::from(id.system)].is_some()
+    fn is_other_vehicle(&self, now: Timestamp, id: MavId) -> bool {
+        Some(id.system) != self.identity.system() && self.is_vehicle(now, id.system)
     }
 
     fn is_state_for_gimbals(&self, frame: &Frame<'_>) -> bool {
@@ -226,7 +244,7 @@ impl Bridge {
 
     /// R18: which of `gimbals`, all of that role, get the frame: what is addressed to a component known there, and
     /// the little that a gimbal uses of what is said to all.
-    fn passing_to_gimbals(&self, frame: &Frame<'_>, gimbals: ChannelSet) -> ChannelSet {
+    fn passing_to_gimbals(&self, now: Timestamp, frame: &Frame<'_>, gimbals: ChannelSet) -> ChannelSet {
         // Until our system id is settled nothing passes: a gimbal takes the id of the first heartbeat it hears.
         if self.identity.system().is_none() {
             return ChannelSet::EMPTY;
@@ -236,7 +254,9 @@ impl Bridge {
         }
         match frame.message_id() {
             // The state of another vehicle would turn our camera.
-            message::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE if self.is_other_vehicle(frame.source()) => ChannelSet::EMPTY,
+            message::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE if self.is_other_vehicle(now, frame.source()) => {
+                ChannelSet::EMPTY
+            }
             message::HEARTBEAT
             | message::SYSTEM_TIME
             | message::TIMESYNC

@@ -107,15 +107,14 @@ impl GimbalManager {
             return Err(Refusal::denied("other_vehicle"));
         }
         let configure = Configure::read(command)?;
-        let before = (self.control.primary(), self.control.secondary());
+        let before = self.holders();
         let policy = self.policy(around);
         self.control.configure(now, sender, configure, around.autopilot, policy)?;
-        let after = (self.control.primary(), self.control.secondary());
+        let after = self.holders();
         if after != before {
-            let [primary, secondary] =
-                [after.0, after.1].map(|id| id.map_or_else(|| "nobody".to_owned(), |id| id.to_string()));
+            let [primary, secondary] = after.map(|id| id.map_or_else(|| "nobody".to_owned(), |id| id.to_string()));
             tracing::info!(gimbal = self.settings.name, primary, secondary, by = %sender, "control changed");
-            self.after_change_of_control(now, before.0);
+            self.after_change_of_control(now, before);
         }
         Ok(())
     }

@@ -150,7 +150,9 @@ fn settle(
         if held_by_other && takeover == Takeover::Ask {
             return Err(Refusal::denied("holder_must_release"));
         }
-        Ok(Some(Holder { id, heard: now }))
+        // Naming a holder again does not make it heard, unless it names itself.
+        let heard = holder.filter(|holder| holder.id == id && id != sender).map_or(now, |holder| holder.heard);
+        Ok(Some(Holder { id, heard }))
     };
     match claim {
         Claim::Keep => Ok(holder),

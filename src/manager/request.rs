@@ -180,12 +180,23 @@ fn set_manual_control(message: &GIMBAL_MANAGER_SET_MANUAL_CONTROL_DATA) -> Resul
     })
 }
 
+/// More than a turn either way is no angle of a gimbal; the margin is for rounding.
+const LARGEST_ANGLE: f64 = std::f64::consts::TAU + 1e-3;
+
+/// Radians per second; no gimbal turns a hundredth as fast for long.
+const LARGEST_RATE: f64 = 100.0;
+
 fn angle(radians: f32) -> Result<Option<Angle>, Refusal> {
-    Ok(number(radians)?.map(Angle::from_radians))
+    within(number(radians)?, LARGEST_ANGLE, "angle_out_of_range").map(|angle| angle.map(Angle::from_radians))
 }
 
 fn rate(radians_per_second: f32) -> Result<Option<AngularRate>, Refusal> {
-    Ok(number(radians_per_second)?.map(AngularRate::from_radians_per_second))
+    let rate = within(number(radians_per_second)?, LARGEST_RATE, "rate_out_of_range")?;
+    Ok(rate.map(AngularRate::from_radians_per_second))
+}
+
+fn within(value: Option<f64>, largest: f64, reason: &'static str) -> Result<Option<f64>, Refusal> {
+    if value.is_some_and(|value| value.abs() > largest) { Err(Refusal::denied(reason)) } else { Ok(value) }
 }
 
 /// NaN is no demand; an infinite number is a fault.
@@ -247,6 +258,9 @@ impl Command {
         if pitch.is_some_and(|pitch| pitch.abs() > 180.0) || yaw.is_some_and(|yaw| yaw.abs() > 360.0) {
             return Err(Refusal::denied("angle_out_of_range"));
         }
+        let largest = LARGEST_RATE.to_degrees();
+        let pitch_rate = within(degrees(3)?, largest, "rate_out_of_range")?;
+        let yaw_rate = within(degrees(4)?, largest, "rate_out_of_range")?;
         let axis = |angle: Option<f64>, rate: Option<f64>| AxisDemand {
             angle: angle.map(|angle| Angle::from_degrees(angle).wrapped()),
             rate: rate.map(AngularRate::from_degrees_per_second),
@@ -254,8 +268,8 @@ impl Command {
         let demand = Demand {
             flags: self.flags()?,
             roll: AxisDemand::default(),
-            pitch: axis(pitch, degrees(3)?),
-            yaw: axis(yaw, degrees(4)?),
+            pitch: axis(pitch, pitch_rate),
+            yaw: axis(yaw, yaw_rate),
             kind: DemandKind::Commanded,
         };
         check(&demand)?;

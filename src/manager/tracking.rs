@@ -130,6 +130,17 @@ impl Tracking {
         }
     }
 
+    /// Whether the gimbal is told to turn on and on.
+    pub fn is_rotating(&self) -> bool {
+        match &self.aim {
+            Aim::Turn(turn) => !is_zero(&turn.turning),
+            Aim::Point(point) => {
+                [point.roll, point.pitch, point.yaw].iter().any(|axis| matches!(axis.motion, Motion::Turning { .. }))
+            }
+            Aim::Idle | Aim::Retract | Aim::Neutral | Aim::Roi(_) => false,
+        }
+    }
+
     /// The gimbal is gone: when it comes back it is not moved until somebody asks for it.
     pub fn forget(&mut self) {
         self.aim = Aim::Idle;
@@ -217,6 +228,11 @@ impl Tracking {
                 {
                     let turning = turn.turning;
                     self.aim = Aim::Point(Point::still(pose, turning.yaw_frame, turning.stabilised));
+                } else if situation.device_frame(turn.turning.yaw_frame) != turn.turning.yaw_frame
+                    && let Some(pose) = situation.measured_pose(turn.turning.yaw_frame)
+                {
+                    // The device has ceased to take this frame: we turn its angles.
+                    self.aim = Aim::Point(turn.in_angles(pose));
                 }
             }
             Aim::Point(point) => {

@@ -56,6 +56,19 @@ pub(super) fn is_zero(turning: &Turning) -> bool {
 }
 
 impl Turn {
+    /// The same rotation as angles that move, from where the gimbal is.
+    pub(super) fn in_angles(&self, pose: Pose) -> Point {
+        let Turning { pitch, yaw, yaw_frame, stabilised, .. } = self.turning;
+        let turning = |at, rate| Axis { at, motion: Motion::Turning { rate, until: self.stops_at } };
+        Point {
+            roll: Axis::still(Angle::ZERO),
+            pitch: turning(pose.pitch, pitch),
+            yaw: turning(pose.yaw, yaw),
+            frame: yaw_frame,
+            stabilised,
+        }
+    }
+
     pub(super) fn stop(&mut self, now: Timestamp) {
         self.turning = Turning {
             roll: self.turning.roll.map(|_| AngularRate::ZERO),

@@ -76,16 +76,25 @@ impl Tracking {
             }
             None => None,
         };
+        let measured = situation.measured_pose(hold);
+        // A ramp begins where the gimbal is, unless the axis is on its way already: then it goes on from there.
+        let begin = |reference: Option<Axis>, measured: Option<Angle>| match (reference, measured) {
+            (Some(Axis { at, motion: Motion::Slew { .. } | Motion::Turning { .. } }), _) => Ok(at),
+            (_, Some(at)) => Ok(at),
+            (Some(Axis { at, .. }), None) => Ok(at),
+            (None, None) => Err(missing),
+        };
         // With rates alone an axis without one stands still; otherwise it keeps what it does.
         let keep = |axis: Axis| if any_rate && !any_angle { Axis::still(axis.at) } else { axis };
-        let axis = |wanted: AxisDemand, angle: Option<Angle>, reference: Option<Axis>| match (angle, wanted.rate) {
+        let axis = |wanted: AxisDemand, angle: Option<Angle>, reference: Option<Axis>, measured: Option<Angle>| match (
+            angle,
+            wanted.rate,
+        ) {
             (Some(angle), None) => Ok(Axis::still(angle)),
             (Some(to), Some(rate)) => {
-                Ok(Axis { at: reference.ok_or(missing)?.at, motion: Motion::Slew { to, rate: rate.abs() } })
+                Ok(Axis { at: begin(reference, measured)?, motion: Motion::Slew { to, rate: rate.abs() } })
             }
-            (None, Some(rate)) => {
-                Ok(Axis { at: reference.ok_or(missing)?.at, motion: Motion::Turning { rate, until } })
-            }
+            (None, Some(rate)) => Ok(Axis { at: begin(reference, measured)?, motion: Motion::Turning { rate, until } }),
             (None, None) => Ok(keep(reference.ok_or(missing)?)),
         };
         let has_roll = capabilities.flags.contains(CapFlags::HAS_ROLL_AXIS);
@@ -95,8 +104,13 @@ impl Tracking {
                 Some(angle) if has_roll => Axis::still(angle),
                 _ => level,
             },
-            pitch: axis(pitch, pitch.angle, reference.map(|reference| reference.pitch))?,
-            yaw: axis(yaw, yaw_angle, reference.map(|reference| reference.yaw))?,
+            pitch: axis(
+                pitch,
+                pitch.angle,
+                reference.map(|reference| reference.pitch),
+                measured.map(|pose| pose.pitch),
+            )?,
+            yaw: axis(yaw, yaw_angle, reference.map(|reference| reference.yaw), measured.map(|pose| pose.yaw))?,
             frame: hold,
             stabilised,
         }))

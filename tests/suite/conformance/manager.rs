@@ -1,5 +1,6 @@
 //! The gimbal manager as its clients see it (protocol checklist 8.4 to 8.7, 8.9, 8.14).
 
+mod bad_days;
 mod commands;
 mod control;
 mod frames;

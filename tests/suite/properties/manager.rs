@@ -81,7 +81,7 @@ proptest! {
         let was_turning = is_turning(&world);
         let mut stopped = false;
         for _ in 0..120 {
-            look_on(&mut world, places, Duration::from_millis(100));
+            look_on(&mut world, places, 44, Duration::from_millis(100));
             let setpoints = check_what_was_said(&mut world, places)?;
             stopped |= setpoints.iter().any(|setpoint| rates(setpoint).iter().all(|rate| rate.is_nan() || *rate == 0.0)
                 && setpoint.angular_velocity_y == 0.0);
@@ -114,7 +114,7 @@ proptest! {
         let mut stopped = false;
         for _ in 0..110 {
             take_step(&mut world, places, Step::Turn { heading_deg });
-            look_on(&mut world, places, Duration::from_millis(100));
+            look_on(&mut world, places, flags, Duration::from_millis(100));
             for setpoint in check_what_was_said(&mut world, places)? {
                 let [_, pitch, yaw] = rates(&setpoint);
                 stopped |= (pitch, yaw) == (0.0, 0.0);
@@ -124,7 +124,7 @@ proptest! {
         prop_assert!(stopped == by_rates, "by rates: {by_rates}, zero rates: {stopped}");
         for _ in 0..5 {
             take_step(&mut world, places, Step::Turn { heading_deg });
-            look_on(&mut world, places, Duration::from_millis(200));
+            look_on(&mut world, places, flags, Duration::from_millis(200));
         }
         let held = check_what_was_said(&mut world, places)?;
         prop_assert!(held.len() >= 15, "it is held");
@@ -163,7 +163,7 @@ fn take_step(world: &mut World, places: Places, step: Step) -> usize {
             0
         }
         Step::Wait { millis } => {
-            look_on(world, places, Duration::from_millis(millis));
+            look_on(world, places, 44, Duration::from_millis(millis));
             0
         }
     }
@@ -238,12 +238,12 @@ fn introduce(world: &mut World, places: Places) {
     world.send(places.gimbal, GIMBAL, &gimbal_heartbeat());
     let information = device_information(Timestamp::ZERO, usual_capabilities());
     world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_INFORMATION(information));
-    look_on(world, places, Duration::from_millis(100));
+    look_on(world, places, 44, Duration::from_millis(100));
 }
 
 /// Time passes while the gimbal says that it is well and looks ahead.
-fn look_on(world: &mut World, places: Places, duration: Duration) {
-    let status = device_status(world.now, 44, 0.0, 0.0);
+fn look_on(world: &mut World, places: Places, flags: u16, duration: Duration) {
+    let status = device_status(world.now, flags, 0.0, 0.0);
     let status = GIMBAL_DEVICE_ATTITUDE_STATUS_DATA { time_boot_ms: u32::MAX, ..status };
     let status = MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status);
     world.run_with(duration, &[(Duration::from_millis(250), places.gimbal, GIMBAL, status)]);

@@ -1,0 +1,231 @@
+//! What must not move the gimbal, and what must stop it: somebody vanishes, restarts, is unplugged, or pretends.
+
+use gimbald::bridge::Input;
+use gimbald::bridge::settings::{Settings, Transport};
+use gimbald::manager::settings::ControlSettings;
+use gimbald::wire::MavId;
+use gimbald::wire::dialect::MavMessage;
+
+use super::{
+    COMPANION, NO_ANGLES, SECOND, Setpoint, assert_near, look, run_looking, setpoints, with_gimbal, with_gimbal_that,
+};
+use crate::support::script::{
+    ACCEPTED, DENIED, NAN, configure, device_information, device_status, gimbal_heartbeat, pitch_yaw_deg, pitchyaw,
+    px4_heartbeat, set_pitchyaw, take_control, usual_capabilities,
+};
+use crate::support::world::{AUTOPILOT, GCS, GIMBAL, World, three_links};
+
+/// D7: "on … SIGTERM zero is sent at once", and it is the last that the gimbal hears, also when its line is slow and the
+/// client goes on.
+#[test]
+fn d7_at_the_end_no_demand_follows_the_zero() {
+    let mut settings = three_links();
+    settings.links[1].transport = Transport::Serial { baud: 19_200 };
+    let (mut world, places) = with_gimbal_that(usual_capabilities(), settings);
+    for _ in 0..40 {
+        world.send(places.ground, GCS, &turn(0.5));
+        world.run_for(SECOND / 50);
+    }
+    world.forget();
+
+    world.input(Input::Shutdown);
+    for _ in 0..10 {
+        world.send(places.ground, GCS, &turn(0.5));
+        world.run_for(SECOND / 50);
+    }
+
+    let setpoints = setpoints(&mut world, places);
+    let last = &setpoints.last().expect("the gimbal is told to stop").1;
+    assert_eq!((last.angular_velocity_y, last.angular_velocity_z), (0.0, 0.0));
+    assert!(world.bridge.is_finished());
+}
+
+/// D9: "no change of … link state moves the camera by itself": a rotation does not outlive a restart of the gimbal, or
+/// its cable.
+#[test]
+fn d9_nothing_turns_on_after_a_restart_or_a_pulled_cable() {
+    for restarts in [true, false] {
+        let (mut world, places) = with_gimbal();
+        look(&mut world, places, 0.0, 0.0);
+        let rate = pitchyaw(NAN, NAN, 0.0, 20.0, 44.0);
+        assert_eq!(world.result_of(places.ground, GCS, &rate), Some(ACCEPTED));
+        run_looking(&mut world, places, SECOND, 0.0, 10.0);
+        world.forget();
+
+        if restarts {
+            let status = device_status(gimbald::timestamp::Timestamp::ZERO, 44, 0.0, 10.0);
+            world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status));
+        } else {
+            world.unplug(places.gimbal);
+            assert_eq!(world.snapshot().gimbals[0].state, "lost", "at once");
+            world.run_for(SECOND / 2);
+            world.plug_in(places.gimbal);
+            world.send(places.gimbal, GIMBAL, &gimbal_heartbeat());
+        }
+        run_looking(&mut world, places, SECOND, 0.0, 10.0);
+
+        let turning = setpoints(&mut world, places);
+        assert_eq!(turning, [], "restarts: {restarts}");
+        assert_eq!(world.snapshot().gimbals[0].setpoint, None);
+    }
+}
+
+/// D6 and D7: a rate ends with the control of who asked for it, secondary or primary.
+#[test]
+fn d7_a_rate_of_the_secondary_ends_with_its_control() {
+    let (mut world, places) = with_gimbal();
+    let places_of = [(GCS, take_control()), (GCS, configure([-1.0, -1.0], [1.0, 192.0]))];
+    for (sender, request) in places_of {
+        assert_eq!(world.result_of(places.ground, sender, &request), Some(ACCEPTED));
+    }
+    run_looking(&mut world, places, 3 * SECOND, 0.0, 0.0);
+    let rate = pitchyaw(NAN, NAN, 0.0, 20.0, 44.0);
+    assert_eq!(world.result_of(places.autopilot, COMPANION, &rate), Some(ACCEPTED), "the primary was silent for 2 s");
+    world.forget();
+
+    let release = configure([-1.0, -1.0], [-3.0, -3.0]);
+    assert_eq!(world.result_of(places.autopilot, COMPANION, &release), Some(ACCEPTED));
+
+    let stopped = setpoints(&mut world, places);
+    assert_eq!(stopped.iter().map(|(_, setpoint)| rates(setpoint)).collect::<Vec<_>>(), [[0.0, 0.0]]);
+}
+
+/// a rate stops "when its sender's heartbeat is lost", also where commands are allowed to turn for ever and nobody
+/// holds control.
+#[test]
+fn a_rate_without_end_ends_when_its_sender_is_gone() {
+    let control = ControlSettings { command_rate_timeout: std::time::Duration::ZERO, ..ControlSettings::default() };
+    let (mut world, places) = with_gimbal_that(usual_capabilities(), Settings { control, ..three_links() });
+    look(&mut world, places, 0.0, 0.0);
+    let rate = pitchyaw(NAN, NAN, 0.0, 20.0, 44.0);
+    assert_eq!(world.result_of(places.autopilot, COMPANION, &rate), Some(ACCEPTED));
+    run_looking(&mut world, places, 9 * SECOND, 0.0, 0.0);
+    assert!(setpoints(&mut world, places).iter().all(|(_, setpoint)| rates(setpoint)[1] > 0.3));
+
+    run_looking(&mut world, places, 2 * SECOND, 0.0, 0.0);
+
+    let last = setpoints(&mut world, places).pop().expect("it is held").1;
+    assert!(rates(&last)[1].is_nan() || rates(&last)[1] == 0.0, "{last:?}");
+}
+
+/// D9: the gimbal does not tell the heading for a while, and the autopilot's is another: the camera stays where it is.
+#[test]
+fn d9_another_source_of_the_heading_moves_nothing() {
+    let (mut world, places) = with_gimbal();
+    world.send(places.autopilot, AUTOPILOT, &px4_heartbeat());
+    let status = |world: &World, heading_deg: Option<f32>| {
+        let mut status = device_status(world.now, 44, 0.0, 30.0);
+        status.delta_yaw = heading_deg.map_or(f32::NAN, f32::to_radians);
+        MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status)
+    };
+    let state = |world: &World| {
+        let state = crate::support::script::autopilot_state(world.now, MavId::new(0, 0), 90.0);
+        MavMessage::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE(state)
+    };
+    world.send(places.autopilot, AUTOPILOT, &state(&world));
+    world.send(places.gimbal, GIMBAL, &status(&world, Some(30.0)));
+    let lock = pitchyaw(0.0, 60.0, NAN, NAN, 92.0);
+    assert_eq!(world.result_of(places.ground, GCS, &lock), Some(ACCEPTED));
+    world.forget();
+
+    for heading_deg in [Some(30.0), None, None, None, Some(30.0)] {
+        world.send(places.autopilot, AUTOPILOT, &state(&world));
+        world.send(places.gimbal, GIMBAL, &status(&world, heading_deg));
+        world.run_for(SECOND / 5);
+        for (_, setpoint) in setpoints(&mut world, places) {
+            assert_near(pitch_yaw_deg(setpoint.q).1, 30.0, 0.01);
+        }
+    }
+}
+
+/// D9: "the start of every ramp [is] the measured attitude".
+#[test]
+fn d9_a_ramp_begins_where_the_gimbal_is() {
+    let (mut world, places) = with_gimbal();
+    look(&mut world, places, 0.0, -90.0);
+    let far = pitchyaw(0.0, 90.0, NAN, NAN, 44.0);
+    assert_eq!(world.result_of(places.ground, GCS, &far), Some(ACCEPTED));
+    run_looking(&mut world, places, SECOND / 2, 0.0, -80.0);
+    world.forget();
+
+    let back = pitchyaw(0.0, 0.0, NAN, 5.0, 44.0);
+    assert_eq!(world.result_of(places.ground, GCS, &back), Some(ACCEPTED));
+
+    let first = &setpoints(&mut world, places)[0].1;
+    assert_near(pitch_yaw_deg(first.q).1, -80.0, 0.01);
+}
+
+/// D1 and the autopilot's restart under another system id: the gimbal that follows it keeps its manager.
+#[test]
+fn d1_a_gimbal_with_a_new_system_id_keeps_its_manager() {
+    let (mut world, places) = with_gimbal();
+    let renamed = MavId::new(7, 154);
+    world.send(places.gimbal, renamed, &gimbal_heartbeat());
+    let information = device_information(world.now, usual_capabilities());
+    world.send(places.gimbal, renamed, &MavMessage::GIMBAL_DEVICE_INFORMATION(information));
+
+    let gimbals = world.snapshot().gimbals;
+    let found: Vec<_> = gimbals.iter().map(|gimbal| (gimbal.manager_component_id, gimbal.device.clone())).collect();
+    assert_eq!(found, [(191, Some("7/154".to_owned()))]);
+}
+
+/// Somebody elsewhere under the gimbal's id is not the gimbal: it is told nothing, and believed nothing.
+#[test]
+fn a_gimbal_is_where_it_was_heard_first() {
+    let (mut world, places) = with_gimbal();
+    look(&mut world, places, 0.0, 0.0);
+    world.forget();
+
+    world.send(places.ground, GIMBAL, &gimbal_heartbeat());
+    let mut information = device_information(world.now, usual_capabilities());
+    (information.pitch_min, information.pitch_max) = (-0.01, 0.01);
+    world.send(places.ground, GIMBAL, &MavMessage::GIMBAL_DEVICE_INFORMATION(information));
+    world.forget();
+    assert_eq!(world.result_of(places.ground, GCS, &pitchyaw(-30.0, 0.0, NAN, NAN, 44.0)), Some(ACCEPTED));
+
+    let setpoint: Setpoint = setpoints(&mut world, places)[0].1.clone();
+    assert_near(pitch_yaw_deg(setpoint.q).0, -30.0, 0.01);
+    assert!(world.snapshot().conflicts[0].contains("1/154 is heard in two places"), "{:?}", world.snapshot().conflicts);
+}
+
+/// D5: "Other vehicles' systems are routed, but never gate, latch or steer", also what they took before they were known
+/// as such; and one stray heartbeat does not bar a ground station for ever.
+#[test]
+fn d5_another_vehicle_loses_what_it_took_and_is_forgotten_when_it_is_gone() {
+    let (mut world, places) = with_gimbal();
+    let stranger = MavId::new(2, 1);
+    let take = configure([-2.0, -2.0], [-1.0, -1.0]);
+    assert_eq!(world.result_of(places.ground, stranger, &take), Some(ACCEPTED));
+
+    world.send(places.ground, stranger, &px4_heartbeat());
+    assert_eq!(world.snapshot().gimbals[0].primary, None);
+    assert_eq!(world.result_of(places.ground, stranger, &take), Some(DENIED));
+
+    run_looking(&mut world, places, 10 * SECOND, 0.0, 0.0);
+    assert_eq!(world.result_of(places.ground, MavId::new(2, 190), &take), Some(ACCEPTED));
+}
+
+/// Numbers that no gimbal can follow are refused before they are reckoned with.
+#[test]
+fn numbers_beyond_reason_are_refused() {
+    let (mut world, places) = with_gimbal();
+    look(&mut world, places, 0.0, 0.0);
+    world.forget();
+    for demand in [set_pitchyaw(0.0, -1e30, NAN, NAN, 44), set_pitchyaw(NAN, NAN, 0.0, 1e30, 44)] {
+        world.send(places.ground, GCS, &demand);
+    }
+    assert_eq!(world.result_of(places.ground, GCS, &pitchyaw(NAN, NAN, 0.0, 3e38, 44.0)), Some(DENIED));
+    world.run_for(SECOND);
+    assert_eq!(setpoints(&mut world, places), []);
+    let rejected = &world.snapshot().gimbals[0].rejected["255/190"];
+    assert_eq!((rejected["angle_out_of_range"], rejected["rate_out_of_range"]), (1, 2));
+}
+
+fn turn(rate: f32) -> MavMessage {
+    let [pitch, yaw] = NO_ANGLES;
+    set_pitchyaw(pitch, yaw, 0.0, rate, 44)
+}
+
+fn rates(setpoint: &Setpoint) -> [f32; 2] {
+    [setpoint.angular_velocity_y, setpoint.angular_velocity_z]
+}
