@@ -6,6 +6,7 @@ use std::net::{IpAddr, SocketAddr};
 use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
 
+use crate::channel::ChannelId;
 use crate::endpoint::Endpoint;
 
 use super::environment::spelling;
@@ -16,6 +17,9 @@ use super::schema::{Configuration, Http, Link};
 use super::settings::HttpSettings;
 use super::suggestion;
 
+/// The most links there may be. As many channels again are left for peers of links that have several.
+const MAX_LINKS: usize = ChannelId::COUNT / 2;
+
 pub(super) fn check(configuration: &Configuration, problems: &mut Vec<Problem>) {
     let Configuration { links, gimbals, http, .. } = configuration;
     // A link section of the wrong kind has been reported.
@@ -25,6 +29,14 @@ pub(super) fn check(configuration: &Configuration, problems: &mut Vec<Problem>) 
             key: "link".to_owned(),
             found: "missing".to_owned(),
             expected: "at least one [[link]] with name, role and endpoint".to_owned(),
+        });
+    }
+    if let Some(link) = links.get(MAX_LINKS) {
+        problems.push(Problem {
+            place: link.place.clone(),
+            key: "link".to_owned(),
+            found: format!("link {} of {}", MAX_LINKS + 1, links.len()),
+            expected: format!("at most {MAX_LINKS} links"),
         });
     }
     check_names(links.iter().filter_map(|link| link.name.as_ref()), problems);
@@ -38,7 +50,8 @@ pub(super) fn check(configuration: &Configuration, problems: &mut Vec<Problem>) 
         }
     }
     numbering::check(gimbals, problems);
-    check_endpoints(links, http, problems);
+    // Every endpoint is compared with every other: not with those that cannot stay.
+    check_endpoints(&links[..links.len().min(MAX_LINKS)], http, problems);
     check_token_file(http, problems);
 }
 

@@ -139,6 +139,25 @@ fn a_file_without_a_link_has_nothing_to_do() {
     }
 }
 
+/// The core has 64 channels, and each peer of a link takes one.
+#[test]
+fn there_are_at_most_32_links() {
+    let links = |count: usize| -> String {
+        let link = |number| {
+            format!("[[link]]\nname = \"l{number}\"\nrole = \"peer\"\nendpoint = \"udpin:0.0.0.0:{number}\"\n")
+        };
+        (1..=count).map(link).collect()
+    };
+    assert_eq!(check(&links(32), &[]).code, Some(0));
+    for count in [33, 80] {
+        let line = format!("c.toml:129: link: link 33 of {count}; expected at most 32 links");
+        assert_eq!(check(&links(count), &[]), refused(&[&line]));
+    }
+    // A gimbal on a link that is one too many has no problem of its own.
+    let text = format!("{}[[gimbal]]\nname = \"camera\"\nlink = \"l33\"\n", links(33));
+    assert_eq!(check(&text, &[]), refused(&["c.toml:129: link: link 33 of 33; expected at most 32 links"]));
+}
+
 #[test]
 fn a_section_of_the_wrong_kind_is_said_to_be_one() {
     for (text, line) in [
