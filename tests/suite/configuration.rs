@@ -1,9 +1,13 @@
 //! What `gimbald check` says of wrong configurations, word for word.
 
 use std::fs;
-use std::os::unix::fs::PermissionsExt;
+use std::os::unix::fs::{PermissionsExt, symlink};
+use std::os::unix::net::UnixListener;
 use std::path::Path;
 use std::time::Duration;
+
+use nix::sys::stat::Mode;
+use nix::unistd::mkfifo;
 
 use gimbald::bridge::settings::{LinkSettings, Role, Settings, SystemId, Transport};
 use gimbald::config::settings::{DaemonSettings, HttpSettings};
@@ -108,18 +112,41 @@ fn a_file_that_is_no_toml_has_one_problem() {
 fn a_file_that_cannot_be_read_is_a_problem_of_the_configuration() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let check = |name| gimbald(folder.path(), &["check", "--config", name], &[]);
-    fs::create_dir(folder.path().join("folder")).expect("a writable folder");
     fs::write(folder.path().join("latin1.toml"), b"# a\n# caf\xe9\n").expect("a writable folder");
 
     assert_eq!(check("absent.toml"), refused(&["absent.toml: no such file; expected a readable TOML file"]));
     assert_eq!(
-        check("folder"),
-        refused(&["folder: cannot be read: Is a directory (os error 21); expected a readable TOML file"])
-    );
-    assert_eq!(
         check("latin1.toml"),
         refused(&["latin1.toml:2: a byte that is not UTF-8; expected a TOML file in UTF-8"])
     );
+}
+
+/// A FIFO would wait for a writer, and `/dev/zero` never ends.
+#[test]
+fn only_a_regular_file_of_at_most_1_mib_is_read() {
+    const EXPECTED: &str = "expected a regular file, in TOML, of at most 1 MiB";
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = |name| folder.path().join(name);
+    let check = |name| gimbald(folder.path(), &["check", "--config", name], &[]);
+    fs::create_dir(path("folder")).expect("a writable folder");
+    mkfifo(&path("fifo"), Mode::S_IRUSR | Mode::S_IWUSR).expect("a writable folder");
+    let _socket = UnixListener::bind(path("socket")).expect("a writable folder");
+    symlink("/dev/zero", path("link-to-zero")).expect("a writable folder");
+    let filled_to = |len: usize| format!("{LINK}#{}", "x".repeat(len - LINK.len() - 1));
+    fs::write(path("large"), filled_to(1_048_576)).expect("a writable folder");
+    fs::write(path("too-large"), filled_to(1_048_577)).expect("a writable folder");
+
+    for (name, found) in [
+        ("folder", "a directory"),
+        ("fifo", "a FIFO"),
+        ("socket", "a socket"),
+        ("/dev/zero", "a device"),
+        ("link-to-zero", "a device"),
+        ("too-large", "larger than 1 MiB"),
+    ] {
+        assert_eq!(check(name), refused(&[&format!("{name}: {found}; {EXPECTED}")]));
+    }
+    assert_eq!(check("large").code, Some(0));
 }
 
 #[test]
