@@ -12,7 +12,7 @@ use crate::endpoint::Endpoint;
 use super::environment::spelling;
 use super::numbering;
 use super::problem::{Place, Problem};
-use super::reader::Located;
+use super::reader::{Located, bare};
 use super::schema::{Configuration, Http, Link};
 use super::settings::HttpSettings;
 use super::suggestion;
@@ -45,7 +45,8 @@ pub(super) fn check(configuration: &Configuration, problems: &mut Vec<Problem>) 
     for link in gimbals.iter().filter_map(|gimbal| gimbal.link.as_ref()) {
         if !names.contains(&link.value.as_str()) {
             let hint = suggestion::hint(&link.value, names.iter().copied());
-            let expected = format!("the name of a link, one of {}{hint}", names.join(", "));
+            let known: Vec<String> = names.iter().map(|name| bare(name)).collect();
+            let expected = format!("the name of a link, one of {}{hint}", known.join(", "));
             problems.push(link.problem(format!("found {}", link.shown), expected));
         }
     }

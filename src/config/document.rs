@@ -6,7 +6,7 @@ use std::fmt;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::problem::{Place, Problem};
+use super::problem::{Place, Problem, shortened};
 
 /// Keys and values, by key.
 pub(super) type Table = BTreeMap<String, Value>;
@@ -33,13 +33,13 @@ pub(super) enum Raw {
     Variable(String),
 }
 
-/// As it is shown to the operator.
+/// As it is shown to the operator; the beginning of what is long.
 impl fmt::Display for Raw {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Text(text) | Self::Variable(text) => write!(f, "{text:?}"),
+            Self::Text(text) | Self::Variable(text) => f.write_str(&shortened(format!("{text:?}"))),
             Self::Integer(value) => write!(f, "{value}"),
-            Self::HugeInteger(digits) => write!(f, "{digits}"),
+            Self::HugeInteger(digits) => f.write_str(&shortened(digits.clone())),
             Self::Float(value) => write!(f, "{value:?}"),
             Self::Flag(value) => write!(f, "{value}"),
             Self::Date => write!(f, "a date"),

@@ -232,7 +232,7 @@ fn several<T>(
             continue;
         };
         let path = match table.get("name").map(|value| &value.raw) {
-            Some(Raw::Text(given)) if is_name(given) => format!("{name}.{given}"),
+            Some(Raw::Text(given)) if is_name(given) => format!("{name}.{}", bare(given)),
             _ => name.to_owned(),
         };
         let mut section = Section::new(path, place.clone(), table, problems);

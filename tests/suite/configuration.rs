@@ -357,6 +357,60 @@ fn two_links_cannot_share_a_port() {
     assert_eq!(check(&LINK.replace("udpin:0.0.0.0:14550", "tcpin:0.0.0.0:8080"), &[]), refused(&[page]));
 }
 
+/// What was found is shown up to 60 characters; what is longer ends with `…` behind them.
+#[test]
+fn long_values_keys_and_names_are_shown_by_their_beginning() {
+    let quoted = |length: usize| format!("\"{}\"", "ä".repeat(length - 2));
+    let cut = format!("\"{}…", "ä".repeat(59));
+    for (value, shown) in [
+        (quoted(60), quoted(60)),
+        (quoted(61), cut.clone()),
+        (quoted(500_000), cut.clone()),
+        ("9".repeat(1_000_000), format!("{}…", "9".repeat(60))),
+    ] {
+        assert_eq!(
+            check(&format!("{LINK}[control]\nfirewall = {value}\n"), &[]),
+            refused(&[&format!("c.toml:6: control.firewall: found {shown}; expected on or warn")]),
+        );
+    }
+    assert_eq!(
+        check(LINK, &[("GIMBALD__CONTROL__FIREWALL", &"ä".repeat(50_000))]),
+        refused(&[&format!("GIMBALD__CONTROL__FIREWALL: control.firewall: found {cut}; expected on or warn")]),
+    );
+    let (long, shown) = ("x".repeat(400_000), format!("{}…", "x".repeat(60)));
+    assert_eq!(
+        check(&format!("{LINK}[http]\n{long} = 1\n"), &[]),
+        refused(&[&format!("c.toml:6: http.{shown}: unknown key; expected one of listen, token_file")]),
+    );
+    assert_eq!(
+        check(
+            &format!(
+                "{}role = 1\n[[gimbal]]\nname = \"g\"\nlink = \"y\"\n",
+                LINK.replace("\"ground\"\nrole = \"ground\"", &format!("\"{long}\""))
+            ),
+            &[]
+        ),
+        refused(&[&format!(
+            "c.toml:4: link.{shown}.role: found 1; expected gimbal, autopilot, ground or peer\n\
+                  c.toml:7: gimbal.g.link: found \"y\"; expected the name of a link, one of {shown}"
+        )]),
+    );
+    // A long name is not compared with another long one.
+    assert_eq!(
+        check(
+            &format!(
+                "{}[[gimbal]]\nname = \"g\"\nlink = \"{long}y\"\n",
+                LINK.replace("\"ground\"\nrole", &format!("\"{long}\"\nrole"))
+            ),
+            &[]
+        ),
+        refused(&[&format!(
+            "c.toml:7: gimbal.g.link: found \"{}…; expected the name of a link, one of {shown}",
+            "x".repeat(59)
+        )])
+    );
+}
+
 #[test]
 fn endpoints_say_what_is_wrong_with_them() {
     for (endpoint, expected) in [
