@@ -1,12 +1,13 @@
 //! The operator's settings: one TOML file, overridden by `GIMBALD__` environment variables.
 //!
-//! The file is read into values that know where they stand (`document.rs`), variables are laid over it
+//! The file (`file.rs`) is read into values that know where they stand (`document.rs`), variables are laid over it
 //! (`environment.rs`), each value is checked for itself (`schema.rs`), then all of them together (`checks.rs`). Whatever
 //! is wrong is collected on the way, so that everything is reported at once.
 
 mod checks;
 mod document;
 mod environment;
+mod file;
 mod numbering;
 pub mod problem;
 mod reader;
@@ -15,9 +16,8 @@ pub mod settings;
 mod suggestion;
 
 use std::path::{Path, PathBuf};
-use std::{fs, io};
 
-use problem::{Place, Problem, Problems};
+use problem::Problems;
 use settings::DaemonSettings;
 
 /// Where the configuration is looked for when the command line names no other file.
@@ -28,8 +28,7 @@ pub const DEFAULT_FILE: &str = "/etc/gimbald/gimbald.toml";
 /// `STATE_DIRECTORY`, as systemd sets it, names the state directory. Other variables are ignored.
 pub fn load(path: &Path, environment: impl Iterator<Item = (String, String)>) -> Result<DaemonSettings, Problems> {
     let in_file = |list| Problems::new(path.to_owned(), list);
-    let text = fs::read(path).map_err(|error| in_file(vec![unreadable(&error)]))?;
-    let text = String::from_utf8(text).map_err(|error| in_file(vec![not_utf8(&error)]))?;
+    let text = file::read(path).map_err(|problem| in_file(vec![problem]))?;
     let mut root = document::parse(&text).map_err(|problem| in_file(vec![problem]))?;
 
     let mut problems = Vec::new();
@@ -58,23 +57,4 @@ pub fn process_environment() -> impl Iterator<Item = (String, String)> {
 /// `$STATE_DIRECTORY` holds the paths of all state directories with colons between them; ours is the first.
 fn first_directory(value: &str) -> Option<PathBuf> {
     value.split(':').next().filter(|path| !path.is_empty()).map(PathBuf::from)
-}
-
-fn unreadable(error: &io::Error) -> Problem {
-    let found = match error.kind() {
-        io::ErrorKind::NotFound => "no such file".to_owned(),
-        _ => format!("cannot be read: {error}"),
-    };
-    Problem { place: Place::File, key: String::new(), found, expected: "a readable TOML file".to_owned() }
-}
-
-fn not_utf8(error: &std::string::FromUtf8Error) -> Problem {
-    let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
-    let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
-    Problem {
-        place: Place::Line(line),
-        key: String::new(),
-        found: "a byte that is not UTF-8".to_owned(),
-        expected: "a TOML file in UTF-8".to_owned(),
-    }
 }

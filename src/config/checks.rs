@@ -6,15 +6,19 @@ use std::net::{IpAddr, SocketAddr};
 use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
 
+use crate::channel::ChannelId;
 use crate::endpoint::Endpoint;
 
 use super::environment::spelling;
 use super::numbering;
 use super::problem::{Place, Problem};
-use super::reader::Located;
+use super::reader::{Located, bare};
 use super::schema::{Configuration, Http, Link};
 use super::settings::HttpSettings;
 use super::suggestion;
+
+/// The most links there may be. As many channels again are left for peers of links that have several.
+const MAX_LINKS: usize = ChannelId::COUNT / 2;
 
 pub(super) fn check(configuration: &Configuration, problems: &mut Vec<Problem>) {
     let Configuration { links, gimbals, http, .. } = configuration;
@@ -27,18 +31,28 @@ pub(super) fn check(configuration: &Configuration, problems: &mut Vec<Problem>) 
             expected: "at least one [[link]] with name, role and endpoint".to_owned(),
         });
     }
+    if let Some(link) = links.get(MAX_LINKS) {
+        problems.push(Problem {
+            place: link.place.clone(),
+            key: "link".to_owned(),
+            found: format!("link {} of {}", MAX_LINKS + 1, links.len()),
+            expected: format!("at most {MAX_LINKS} links"),
+        });
+    }
     check_names(links.iter().filter_map(|link| link.name.as_ref()), problems);
     check_names(gimbals.iter().filter_map(|gimbal| gimbal.name.as_ref()), problems);
     let names: Vec<&str> = links.iter().filter_map(|link| link.name.as_ref()).map(|name| name.value.as_str()).collect();
     for link in gimbals.iter().filter_map(|gimbal| gimbal.link.as_ref()) {
         if !names.contains(&link.value.as_str()) {
             let hint = suggestion::hint(&link.value, names.iter().copied());
-            let expected = format!("the name of a link, one of {}{hint}", names.join(", "));
+            let known: Vec<String> = names.iter().map(|name| bare(name)).collect();
+            let expected = format!("the name of a link, one of {}{hint}", known.join(", "));
             problems.push(link.problem(format!("found {}", link.shown), expected));
         }
     }
     numbering::check(gimbals, problems);
-    check_endpoints(links, http, problems);
+    // Every endpoint is compared with every other: not with those that cannot stay.
+    check_endpoints(&links[..links.len().min(MAX_LINKS)], http, problems);
     check_token_file(http, problems);
 }
 

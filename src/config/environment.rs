@@ -4,6 +4,7 @@ use ::config::{Environment, Map, Source};
 
 use super::document::{Raw, Table, Value};
 use super::problem::{Place, Problem};
+use super::reader::bare;
 use super::suggestion;
 
 pub(super) const PREFIX: &str = "GIMBALD__";
@@ -79,5 +80,6 @@ fn lay_over(root: &mut Table, path: &str, value: Value) -> Result<(), (String, S
         names.push(name.clone());
     }
     let hint = suggestion::hint(entry, names.iter().map(String::as_str));
-    Err((format!("no {section} named {entry:?} in the file"), format!("one of {}{hint}", names.join(", "))))
+    let (found, known) = (Raw::Text(entry.to_owned()), names.iter().map(|name| bare(name)).collect::<Vec<_>>());
+    Err((format!("no {section} named {found} in the file"), format!("one of {}{hint}", known.join(", "))))
 }

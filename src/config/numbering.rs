@@ -3,6 +3,7 @@
 //! Device 154 has manager 191, 171 has 192, 172 has 193, 173 has 194; other gimbals take the free ones in file order.
 
 use super::problem::Problem;
+use super::reader::bare;
 use super::schema::Gimbal;
 
 /// The managers that need no setting: ONBOARD_COMPUTER to ONBOARD_COMPUTER4.
@@ -36,7 +37,7 @@ fn check_managers(gimbals: &[Gimbal], problems: &mut Vec<Problem>) {
     }
     let free = AUTOMATIC.iter().filter(|id| !taken.contains(id)).count();
     for gimbal in gimbals.iter().filter(|gimbal| gimbal.manager_component_id.is_none()).skip(free) {
-        let name = gimbal.name.as_ref().map(|name| format!(".{}", name.value)).unwrap_or_default();
+        let name = gimbal.name.as_ref().map(|name| format!(".{}", bare(&name.value))).unwrap_or_default();
         problems.push(Problem {
             place: gimbal.place.clone(),
             key: format!("gimbal{name}.manager_component_id"),

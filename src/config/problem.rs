@@ -33,6 +33,17 @@ pub enum Place {
     Variable(String),
 }
 
+/// So many characters of a value, key or name are shown.
+const SHOWN_LEN: usize = 60;
+
+/// What the operator wrote, as it is shown: as it is, or its beginning and `…`.
+pub(super) fn shortened(text: String) -> String {
+    match text.char_indices().nth(SHOWN_LEN) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text,
+    }
+}
+
 impl Problems {
     pub(super) fn new(file: PathBuf, mut list: Vec<Problem>) -> Self {
         list.sort_by(|a, b| a.place.cmp(&b.place));

@@ -4,7 +4,7 @@ use std::fmt;
 use std::ops::RangeInclusive;
 
 use super::document::{Raw, Table, Value};
-use super::problem::{Place, Problem};
+use super::problem::{Place, Problem, shortened};
 use super::suggestion;
 
 /// A value with the place it was read from, to report what is only wrong together with others.
@@ -137,9 +137,9 @@ impl<'a> Section<'a> {
     }
 }
 
-/// A key as TOML would have it: quoted when it holds anything unusual.
+/// A key as TOML would have it, quoted when it holds anything unusual; the beginning of a long one.
 pub(super) fn bare(key: &str) -> String {
-    if is_name(key) { key.to_owned() } else { format!("{key:?}") }
+    shortened(if is_name(key) { key.to_owned() } else { format!("{key:?}") })
 }
 
 /// `[A-Za-z0-9_-]+`, which is what TOML takes for a bare key.

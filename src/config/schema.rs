@@ -54,6 +54,8 @@ pub(super) struct Vehicle {
 
 #[derive(Debug)]
 pub(super) struct Link {
+    /// The `[[link]]` line.
+    pub place: Place,
     pub name: Option<Located<String>>,
     pub role: Option<Located<Role>>,
     pub endpoint: Option<Located<Endpoint>>,
@@ -103,8 +105,9 @@ fn vehicle(section: &mut Section<'_>) -> Vehicle {
     Vehicle { system_id: section.read("system_id", system_id) }
 }
 
-fn link(section: &mut Section<'_>) -> Link {
+fn link(section: &mut Section<'_>, place: Place) -> Link {
     Link {
+        place,
         name: section.required("name", "a name of letters, digits, - and _", name),
         role: section.required("role", "gimbal, autopilot, ground or peer", |raw| word(raw, ROLES)),
         endpoint: section.required("endpoint", "an endpoint, for example udpin:0.0.0.0:14550", endpoint),
@@ -161,7 +164,7 @@ pub fn keys() -> Vec<(&'static str, Vec<&'static str>)> {
     }
     vec![
         asked("vehicle", vehicle),
-        asked("link", link),
+        asked("link", |section| link(section, Place::File)),
         asked("gimbal", |section| gimbal(section, Place::File)),
         asked("control", control),
         asked("roi", roi),
@@ -173,7 +176,7 @@ pub fn keys() -> Vec<(&'static str, Vec<&'static str>)> {
 pub(super) fn read(mut root: Table, problems: &mut Vec<Problem>) -> Configuration {
     let configuration = Configuration {
         vehicle: single(&mut root, "vehicle", problems, vehicle).unwrap_or_default(),
-        links: several(&mut root, "link", problems, |section, _| link(section)),
+        links: several(&mut root, "link", problems, link),
         gimbals: several(&mut root, "gimbal", problems, gimbal),
         control: single(&mut root, "control", problems, control).unwrap_or_default(),
         roi: single(&mut root, "roi", problems, roi).unwrap_or_default(),
@@ -229,7 +232,7 @@ fn several<T>(
             continue;
         };
         let path = match table.get("name").map(|value| &value.raw) {
-            Some(Raw::Text(given)) if is_name(given) => format!("{name}.{given}"),
+            Some(Raw::Text(given)) if is_name(given) => format!("{name}.{}", bare(given)),
             _ => name.to_owned(),
         };
         let mut section = Section::new(path, place.clone(), table, problems);

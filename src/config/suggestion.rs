@@ -1,14 +1,27 @@
 //! "Did you mean …?"
 
+/// What is longer is no slip, and comparing it takes memory for the product of both lengths.
+const LONGEST: usize = 64;
+
 /// The candidate that `found` most likely was meant to be, ignoring case; `None` when nothing is close.
 pub(super) fn closest<'a>(found: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let length = found.chars().count();
+    if length > LONGEST {
+        return None;
+    }
     candidates
         .into_iter()
+        // What one is longer than the other is the least distance, and known without comparing.
+        .filter(|candidate| length.abs_diff(candidate.chars().count()) <= tolerated(length, candidate))
         .map(|candidate| (distance(&found.to_lowercase(), &candidate.to_lowercase()), candidate))
-        .filter(|(distance, candidate)| *distance <= (length.max(candidate.len()) / 3).max(1) && *distance < length)
+        .filter(|(distance, candidate)| *distance <= tolerated(length, candidate) && *distance < length)
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, candidate)| candidate)
+}
+
+/// The greatest distance between a slip of so many characters and what was meant.
+fn tolerated(length: usize, candidate: &str) -> usize {
+    (length.max(candidate.chars().count()) / 3).max(1)
 }
 
 /// `; did you mean …?`, or nothing.

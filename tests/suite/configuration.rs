@@ -1,9 +1,13 @@
 //! What `gimbald check` says of wrong configurations, word for word.
 
 use std::fs;
-use std::os::unix::fs::PermissionsExt;
+use std::os::unix::fs::{PermissionsExt, symlink};
+use std::os::unix::net::UnixListener;
 use std::path::Path;
 use std::time::Duration;
+
+use nix::sys::stat::Mode;
+use nix::unistd::mkfifo;
 
 use gimbald::bridge::settings::{LinkSettings, Role, Settings, SystemId, Transport};
 use gimbald::config::settings::{DaemonSettings, HttpSettings};
@@ -108,18 +112,41 @@ fn a_file_that_is_no_toml_has_one_problem() {
 fn a_file_that_cannot_be_read_is_a_problem_of_the_configuration() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let check = |name| gimbald(folder.path(), &["check", "--config", name], &[]);
-    fs::create_dir(folder.path().join("folder")).expect("a writable folder");
     fs::write(folder.path().join("latin1.toml"), b"# a\n# caf\xe9\n").expect("a writable folder");
 
     assert_eq!(check("absent.toml"), refused(&["absent.toml: no such file; expected a readable TOML file"]));
     assert_eq!(
-        check("folder"),
-        refused(&["folder: cannot be read: Is a directory (os error 21); expected a readable TOML file"])
-    );
-    assert_eq!(
         check("latin1.toml"),
         refused(&["latin1.toml:2: a byte that is not UTF-8; expected a TOML file in UTF-8"])
     );
+}
+
+/// A FIFO would wait for a writer, and `/dev/zero` never ends.
+#[test]
+fn only_a_regular_file_of_at_most_1_mib_is_read() {
+    const EXPECTED: &str = "expected a regular file, in TOML, of at most 1 MiB";
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = |name| folder.path().join(name);
+    let check = |name| gimbald(folder.path(), &["check", "--config", name], &[]);
+    fs::create_dir(path("folder")).expect("a writable folder");
+    mkfifo(&path("fifo"), Mode::S_IRUSR | Mode::S_IWUSR).expect("a writable folder");
+    let _socket = UnixListener::bind(path("socket")).expect("a writable folder");
+    symlink("/dev/zero", path("link-to-zero")).expect("a writable folder");
+    let filled_to = |len: usize| format!("{LINK}#{}", "x".repeat(len - LINK.len() - 1));
+    fs::write(path("large"), filled_to(1_048_576)).expect("a writable folder");
+    fs::write(path("too-large"), filled_to(1_048_577)).expect("a writable folder");
+
+    for (name, found) in [
+        ("folder", "a directory"),
+        ("fifo", "a FIFO"),
+        ("socket", "a socket"),
+        ("/dev/zero", "a device"),
+        ("link-to-zero", "a device"),
+        ("too-large", "larger than 1 MiB"),
+    ] {
+        assert_eq!(check(name), refused(&[&format!("{name}: {found}; {EXPECTED}")]));
+    }
+    assert_eq!(check("large").code, Some(0));
 }
 
 #[test]
@@ -137,6 +164,25 @@ fn a_file_without_a_link_has_nothing_to_do() {
     for text in ["", "[http]\n", "link = []\n"] {
         assert_eq!(check(text, &[]), refused(&[missing]), "{text:?}");
     }
+}
+
+/// The core has 64 channels, and each peer of a link takes one.
+#[test]
+fn there_are_at_most_32_links() {
+    let links = |count: usize| -> String {
+        let link = |number| {
+            format!("[[link]]\nname = \"l{number}\"\nrole = \"peer\"\nendpoint = \"udpin:0.0.0.0:{number}\"\n")
+        };
+        (1..=count).map(link).collect()
+    };
+    assert_eq!(check(&links(32), &[]).code, Some(0));
+    for count in [33, 80] {
+        let line = format!("c.toml:129: link: link 33 of {count}; expected at most 32 links");
+        assert_eq!(check(&links(count), &[]), refused(&[&line]));
+    }
+    // A gimbal on a link that is one too many has no problem of its own.
+    let text = format!("{}[[gimbal]]\nname = \"camera\"\nlink = \"l33\"\n", links(33));
+    assert_eq!(check(&text, &[]), refused(&["c.toml:129: link: link 33 of 33; expected at most 32 links"]));
 }
 
 #[test]
@@ -309,6 +355,60 @@ fn two_links_cannot_share_a_port() {
     }
     let page = "c.toml:4: link.ground.endpoint: found \"tcpin:0.0.0.0:8080\", the port of http.listen; expected a port of its own";
     assert_eq!(check(&LINK.replace("udpin:0.0.0.0:14550", "tcpin:0.0.0.0:8080"), &[]), refused(&[page]));
+}
+
+/// What was found is shown up to 60 characters; what is longer ends with `…` behind them.
+#[test]
+fn long_values_keys_and_names_are_shown_by_their_beginning() {
+    let quoted = |length: usize| format!("\"{}\"", "ä".repeat(length - 2));
+    let cut = format!("\"{}…", "ä".repeat(59));
+    for (value, shown) in [
+        (quoted(60), quoted(60)),
+        (quoted(61), cut.clone()),
+        (quoted(500_000), cut.clone()),
+        ("9".repeat(1_000_000), format!("{}…", "9".repeat(60))),
+    ] {
+        assert_eq!(
+            check(&format!("{LINK}[control]\nfirewall = {value}\n"), &[]),
+            refused(&[&format!("c.toml:6: control.firewall: found {shown}; expected on or warn")]),
+        );
+    }
+    assert_eq!(
+        check(LINK, &[("GIMBALD__CONTROL__FIREWALL", &"ä".repeat(50_000))]),
+        refused(&[&format!("GIMBALD__CONTROL__FIREWALL: control.firewall: found {cut}; expected on or warn")]),
+    );
+    let (long, shown) = ("x".repeat(400_000), format!("{}…", "x".repeat(60)));
+    assert_eq!(
+        check(&format!("{LINK}[http]\n{long} = 1\n"), &[]),
+        refused(&[&format!("c.toml:6: http.{shown}: unknown key; expected one of listen, token_file")]),
+    );
+    assert_eq!(
+        check(
+            &format!(
+                "{}role = 1\n[[gimbal]]\nname = \"g\"\nlink = \"y\"\n",
+                LINK.replace("\"ground\"\nrole = \"ground\"", &format!("\"{long}\""))
+            ),
+            &[]
+        ),
+        refused(&[&format!(
+            "c.toml:4: link.{shown}.role: found 1; expected gimbal, autopilot, ground or peer\n\
+                  c.toml:7: gimbal.g.link: found \"y\"; expected the name of a link, one of {shown}"
+        )]),
+    );
+    // A long name is not compared with another long one.
+    assert_eq!(
+        check(
+            &format!(
+                "{}[[gimbal]]\nname = \"g\"\nlink = \"{long}y\"\n",
+                LINK.replace("\"ground\"\nrole", &format!("\"{long}\"\nrole"))
+            ),
+            &[]
+        ),
+        refused(&[&format!(
+            "c.toml:7: gimbal.g.link: found \"{}…; expected the name of a link, one of {shown}",
+            "x".repeat(59)
+        )])
+    );
 }
 
 #[test]
