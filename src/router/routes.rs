@@ -106,7 +106,7 @@ impl Routes {
     /// Notes the time since boot that `id` reports on `channel`. A smaller one than before means that it was
     /// restarted, and returns true: its system's routes are to be forgotten.
     ///
-    /// Redundant links lag behind each other, so a time from another channel must be smaller by [`MOVE_GRACE`].
+    /// Redundant links lag behind each other, so a time from another channel must be smaller by more than five seconds.
     pub fn note_boot_time(&mut self, channel: ChannelId, id: MavId, boot_ms: u32) -> bool {
         let Some(at) = self.position(id) else { return false };
         let latest = &mut self.components[at].boot_ms;

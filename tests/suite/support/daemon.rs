@@ -1,8 +1,9 @@
 //! The real daemon as a process, and what is around it: real sockets, pseudo-terminals and simulated peers on them.
 
+use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{Read, Write};
-use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpStream, UdpSocket};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, TcpStream, UdpSocket};
 use std::os::fd::OwnedFd;
 use std::os::unix::fs::{OpenOptionsExt, symlink};
 use std::path::{Path, PathBuf};
@@ -47,6 +48,8 @@ pub fn wait_for<T>(what: &str, mut check: impl FnMut() -> Option<T>) -> T {
 pub struct Site {
     pub folder: tempfile::TempDir,
     pub address: IpAddr,
+    /// What stands for each usual port: somebody may have the usual one on every address of this machine.
+    ports: Mutex<BTreeMap<u16, u16>>,
 }
 
 impl Site {
@@ -55,18 +58,21 @@ impl Site {
         let [.., high, low] = std::process::id().to_be_bytes();
         let number = SITES.fetch_add(1, Ordering::Relaxed);
         let address = Ipv4Addr::new(127, 1 + high % 254, low, number);
-        Self { folder: tempfile::tempdir().expect("a temporary folder"), address: address.into() }
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        Self { folder, address: address.into(), ports: Mutex::default() }
     }
 
-    pub fn port(&self, port: u16) -> SocketAddr {
-        SocketAddr::new(self.address, port)
+    /// Where what usually has this port is at this site.
+    pub fn port(&self, usual: u16) -> SocketAddr {
+        let mut ports = self.ports.lock().expect("no test panics in here");
+        SocketAddr::new(self.address, *ports.entry(usual).or_insert_with(|| free_port(self.address)))
     }
 
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    /// Starts `gimbald run`; in `config`, `{ip}` stands for our address and `{dir}` for our folder.
+    /// Starts `gimbald run`; in `config`, `{ip}:PORT` stands for [`port`](Self::port) and `{dir}` for our folder.
     pub fn start(&self, config: &str, variables: &[(&str, &str)]) -> Daemon {
         let text = self.filled(&format!("{config}\n[http]\nlisten = \"{{ip}}:8080\"\n"));
         fs::write(self.path("c.toml"), text).expect("a writable folder");
@@ -85,8 +91,24 @@ impl Site {
     }
 
     fn filled(&self, text: &str) -> String {
-        text.replace("{ip}", &self.address.to_string()).replace("{dir}", &self.folder.path().to_string_lossy())
+        let mut parts = text.split("{ip}:");
+        let mut filled = parts.next().unwrap_or_default().to_owned();
+        for part in parts {
+            let end = part.find(|char: char| !char.is_ascii_digit()).unwrap_or(part.len());
+            let usual = part[..end].parse().expect("a port follows the address");
+            filled.push_str(&self.port(usual).to_string());
+            filled.push_str(&part[end..]);
+        }
+        filled.replace("{dir}", &self.folder.path().to_string_lossy())
     }
+}
+
+/// A port that nobody has there, neither for UDP nor for TCP.
+fn free_port(address: IpAddr) -> u16 {
+    wait_for("a free port", || {
+        let port = TcpListener::bind((address, 0)).ok()?.local_addr().ok()?.port();
+        UdpSocket::bind((address, port)).is_ok().then_some(port)
+    })
 }
 
 /// The text of a `[[link]]`.
