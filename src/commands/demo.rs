@@ -4,7 +4,7 @@
 //! daemon as it always does.
 
 use std::io::{self, Write};
-use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
+use std::net::{Ipv4Addr, SocketAddr, TcpListener, UdpSocket};
 use std::thread;
 use std::time::Duration;
 
@@ -34,6 +34,14 @@ const GIMBAL_BAUD: u32 = 115_200;
 /// Why there is no demo.
 #[derive(Debug, thiserror::Error)]
 enum DemoError {
+    #[error("the page cannot be shown at {address} (does gimbald run there?); name another place with --http")]
+    Page {
+        address: SocketAddr,
+        #[source]
+        cause: io::Error,
+    },
+    #[error("UDP port {CLIENT}, where a second client connects, is taken (does another demo run?)")]
+    Client(#[source] io::Error),
     #[error("no pseudo-terminal for the gimbal")]
     Pty(#[source] io::Error),
     #[error("no UDP port for the vehicle")]
@@ -58,6 +66,9 @@ pub fn demo(arguments: &DemoArgs, output: &mut impl Write, errors: &mut impl Wri
 }
 
 fn run(arguments: &DemoArgs, output: &mut impl Write) -> Result<(), DemoError> {
+    // Without them the instructions would lead to somebody else's daemon.
+    TcpListener::bind(arguments.http).map_err(|cause| DemoError::Page { address: arguments.http, cause })?;
+    UdpSocket::bind(CLIENT).map_err(DemoError::Client)?;
     let cable = Pty::open().map_err(DemoError::Pty)?;
     let path = cable.path().map_err(DemoError::Pty)?.to_string_lossy().into_owned();
     let autopilot = free_port().map_err(DemoError::Port)?;

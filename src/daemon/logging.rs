@@ -10,7 +10,7 @@ use std::str::FromStr;
 
 use tracing_appender::non_blocking::{NonBlocking, NonBlockingBuilder, WorkerGuard};
 use tracing_subscriber::EnvFilter;
-use tracing_subscriber::filter::ParseError;
+use tracing_subscriber::filter::{LevelFilter, ParseError};
 
 /// Lines that may wait for a slow reader; later ones are dropped.
 const WAITING_LINES: usize = 1024;
@@ -19,11 +19,30 @@ const WAITING_LINES: usize = 1024;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LogFilter(String);
 
-impl FromStr for LogFilter {
-    type Err = ParseError;
+/// Why a filter is refused.
+#[derive(Debug, thiserror::Error)]
+pub enum LogFilterError {
+    #[error(transparent)]
+    Syntax(#[from] ParseError),
+    /// It would be taken for the name of a module that nobody has, and silence everything.
+    #[error(
+        "{0:?} is no level; expected off, error, warn, info, debug or trace, or MODULE=LEVEL as in gimbald::links=debug"
+    )]
+    NoSuchLevel(String),
+}
 
-    fn from_str(text: &str) -> Result<Self, ParseError> {
-        EnvFilter::builder().parse(text).map(|_| Self(text.to_owned()))
+impl FromStr for LogFilter {
+    type Err = LogFilterError;
+
+    fn from_str(text: &str) -> Result<Self, LogFilterError> {
+        EnvFilter::builder().parse(text)?;
+        let alone = |directive: &&str| !directive.contains(['=', '[']) && directive.parse::<LevelFilter>().is_err();
+        match text.split(',').map(str::trim).filter(|directive| !directive.is_empty()).find(alone) {
+            Some(word) if !word.starts_with(env!("CARGO_PKG_NAME")) => {
+                Err(LogFilterError::NoSuchLevel(word.to_owned()))
+            }
+            _ => Ok(Self(text.to_owned())),
+        }
     }
 }
 
@@ -110,7 +129,7 @@ mod tests {
         for right in ["info", "off", "info,gimbald::links=debug", "gimbald[link{name=ground}]=trace"] {
             assert_eq!(right.parse::<LogFilter>().map(|filter| filter.to_string()).ok().as_deref(), Some(right));
         }
-        for wrong in ["a=b=c", "gimbald=loud", "gimbald[link"] {
+        for wrong in ["a=b=c", "gimbald=loud", "gimbald[link", "inof", "info,dbug"] {
             assert!(wrong.parse::<LogFilter>().is_err(), "{wrong}");
         }
     }
