@@ -168,6 +168,10 @@ impl Bridge {
 
     /// Does what is due at `now`; drain [`poll_output`](Self::poll_output) afterwards.
     pub fn handle_timeout(&mut self, now: Timestamp) {
+        if self.shutting_down {
+            self.channels.pump_all(now, &mut self.outbox);
+            return;
+        }
         self.settle_identity(now);
         for channel in self.channels.stalled(now) {
             self.decode_stream(now, channel, |decoder| decoder.handle_timeout(now));
@@ -197,6 +201,9 @@ impl Bridge {
 
     /// When [`handle_timeout`](Self::handle_timeout) is due.
     pub fn poll_timeout(&self) -> Option<Timestamp> {
+        if self.shutting_down {
+            return self.channels.poll_output_timeout();
+        }
         let timers = [
             self.timers.next().map(|(at, _)| at),
             self.identity.poll_timeout(),
@@ -393,6 +400,8 @@ impl Bridge {
             gimbal.manager.handle_shutdown(now, around);
         }
         self.carry_out(now);
+        // The goodbye is the last word.
+        self.channels.keep_control();
         if self.identity.system().is_some() {
             for at in 0..self.roster.len() {
                 let gimbal = self.roster.get_mut(at);
@@ -402,7 +411,6 @@ impl Bridge {
                 }
             }
         }
-        self.timers.cancel(Timer::Heartbeat);
         self.shutting_down = true;
     }
 

@@ -314,17 +314,29 @@ impl Channels {
         }
     }
 
+    /// Before the goodbye: of what waits for a paced line only control still goes out.
+    pub fn keep_control(&mut self) {
+        for channel in self.paced {
+            if let Some(queue) = self.channels[channel.index()].as_mut().and_then(|channel| channel.queue.as_mut()) {
+                queue.keep_control();
+            }
+        }
+    }
+
     /// Whether no paced line has a frame left.
     pub fn is_drained(&self) -> bool {
-        let mut queues = self.paced.filter_map(|channel| self.channel(channel)?.queue.as_ref()?.poll_timeout());
-        queues.next().is_none()
+        self.poll_output_timeout().is_none()
     }
 
     /// When a paced line has room, or a stream's unfinished frame is to be given up.
     pub fn poll_timeout(&self) -> Option<Timestamp> {
-        let queues = self.paced.filter_map(|channel| self.channel(channel)?.queue.as_ref()?.poll_timeout());
         let decoders = self.streams.filter_map(|channel| self.channel(channel)?.decoder.as_ref()?.poll_timeout());
-        queues.chain(decoders).min()
+        decoders.chain(self.poll_output_timeout()).min()
+    }
+
+    /// When a paced line has room.
+    pub fn poll_output_timeout(&self) -> Option<Timestamp> {
+        self.paced.filter_map(|channel| self.channel(channel)?.queue.as_ref()?.poll_timeout()).min()
     }
 
     /// Streams whose unfinished frame is to be given up at `now`.

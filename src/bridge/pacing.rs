@@ -65,6 +65,7 @@ pub const REPLACED: &str = "replaced_by_newer";
 pub const QUEUE_FULL: &str = "queue_full";
 pub const STALE: &str = "stale";
 pub const LINK_DOWN: &str = "link_down";
+pub const SHUTTING_DOWN: &str = "shutting_down";
 
 /// Telemetry waits at most so long; what is older by the time the wire is free has been overtaken by the next.
 pub const MAX_BROADCAST_AGE: Duration = Duration::from_millis(300);
@@ -189,6 +190,16 @@ impl SerialQueue {
             }
         }
         self.line_free_at = Timestamp::ZERO;
+    }
+
+    /// The end is near: only control still goes out.
+    pub fn keep_control(&mut self) {
+        for queue in 1..self.waiting.len() {
+            while let Some(slot) = self.waiting[queue].pop_front() {
+                self.count(SHUTTING_DOWN);
+                self.free.push(slot);
+            }
+        }
     }
 
     /// How many frames were not sent, by reason.

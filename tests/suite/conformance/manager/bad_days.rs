@@ -4,7 +4,7 @@ use gimbald::bridge::Input;
 use gimbald::bridge::settings::{Settings, Transport};
 use gimbald::manager::settings::ControlSettings;
 use gimbald::wire::MavId;
-use gimbald::wire::dialect::MavMessage;
+use gimbald::wire::dialect::{HEARTBEAT_DATA, MavMessage};
 
 use super::{
     COMPANION, NO_ANGLES, SECOND, Setpoint, assert_near, look, run_looking, setpoints, with_gimbal, with_gimbal_that,
@@ -34,6 +34,9 @@ fn d7_at_the_end_no_demand_follows_the_zero() {
         world.run_for(SECOND / 50);
     }
 
+    let heard = world.arrivals(places.gimbal);
+    let goodbye: HEARTBEAT_DATA = heard.last().expect("the goodbye").decode();
+    assert_eq!(goodbye.system_status, 7, "POWEROFF is the last word");
     let setpoints = setpoints(&mut world, places);
     let last = &setpoints.last().expect("the gimbal is told to stop").1;
     assert_eq!((last.angular_velocity_y, last.angular_velocity_z), (0.0, 0.0));
