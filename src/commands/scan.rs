@@ -272,7 +272,7 @@ mod tests {
     use crate::sim::peer::Peer;
     use crate::sim::vehicle::{Vehicle, VehicleSettings};
     use crate::timestamp::Timestamp;
-    use crate::wire::DatagramFrames;
+    use crate::wire::StreamDecoder;
 
     /// A peer behind a pseudo-terminal, which understands one of the baud rates that are tried, counted from one.
     ///
@@ -306,11 +306,13 @@ mod tests {
         let clock = Clock::start();
         let mut attempts = 0;
         let mut buffer = [0; 1024];
+        // A read may end inside a frame.
+        let mut frames = StreamDecoder::default();
         while stopped.try_recv() == Err(TryRecvError::Empty) {
             let now = clock.now();
             match read(line, &mut buffer) {
                 Ok(length) => {
-                    let mut frames = DatagramFrames::new(&buffer[..length]);
+                    frames.push(now, &buffer[..length]);
                     while let Some(frame) = frames.next_frame() {
                         attempts += usize::from(frame.sequence() == 0);
                     }
