@@ -5,6 +5,7 @@
 
 pub mod control;
 pub mod intervals;
+mod manual;
 pub mod messages;
 pub mod request;
 pub mod settings;
@@ -16,7 +17,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 use crate::channel::{ChannelId, ChannelSet};
-use crate::geometry::{Angle, AngularRate, AxisLimits};
+use crate::geometry::Angle;
 use crate::gimbals::capabilities::Capabilities;
 use crate::gimbals::report::{GimbalStatus, Identity, Report};
 use crate::gimbals::setpoint::Setpoint;
@@ -394,7 +395,7 @@ impl GimbalManager {
         self.gate(now, sender, around)?;
         let capabilities = *self.steerable()?;
         let demand = match demand.kind {
-            DemandKind::Manual => self.scale_manual(demand, &capabilities),
+            DemandKind::Manual => manual::scale(demand, &capabilities.limits, &self.settings),
             DemandKind::Streamed | DemandKind::Commanded => *demand,
         };
         let situation = self.situation(now, &capabilities, around);
@@ -405,26 +406,6 @@ impl GimbalManager {
             self.primary_demand = Some(now);
         }
         Ok(())
-    }
-
-    /// Manual control (288) from −1…1 to what the gimbal can do: the ends of its reach, or the configured rates.
-    fn scale_manual(&self, demand: &Demand, capabilities: &Capabilities) -> Demand {
-        let reach = |fraction: Angle, limits: Option<AxisLimits>, substitute: f64| {
-            let (min, max) =
-                limits.map_or((-substitute, substitute), |limits| (limits.min().degrees(), limits.max().degrees()));
-            let fraction = fraction.radians();
-            Angle::from_degrees(if fraction < 0.0 { -fraction * min } else { fraction * max })
-        };
-        let mut scaled = *demand;
-        let limits = &capabilities.limits;
-        scaled.pitch.angle = demand.pitch.angle.map(|fraction| reach(fraction, limits.pitch, 90.0));
-        scaled.yaw.angle = demand.yaw.angle.map(|fraction| reach(fraction, limits.yaw, 180.0));
-        let rate = |fraction: AngularRate, full_dps: f64| {
-            AngularRate::from_degrees_per_second(fraction.radians_per_second() * full_dps)
-        };
-        scaled.pitch.rate = demand.pitch.rate.map(|fraction| rate(fraction, self.settings.manual_pitch_rate_dps));
-        scaled.yaw.rate = demand.yaw.rate.map(|fraction| rate(fraction, self.settings.manual_yaw_rate_dps));
-        scaled
     }
 
     fn timeouts(&self) -> RateTimeouts {
