@@ -37,6 +37,9 @@ use crate::timestamp::Timestamp;
 /// | `ack-target=P` | a `COMMAND_ACK` addresses somebody else |
 /// | `sequence-gap=P` | 1 to 10 sequence numbers are left out before the frame |
 /// | `nan=P` | one float of the frame is NaN |
+/// | `slow-parameters=D` | every `PARAM_VALUE` comes later by D, as from a slow flash memory |
+/// | `foreign=P` | a heartbeat of another vehicle, 99/1, comes before the frame |
+/// | `twin=P` | a second device under the same ids says its own attitude before the frame |
 /// | `silence=D@T` | nothing is sent for D |
 /// | `power-cut=D@T` | off for D, then a start as after a power-on |
 /// | `baud-mismatch=D@T` | for D every byte sent is a random one |
@@ -62,6 +65,9 @@ pub struct Faults {
     pub ack_target: f64,
     pub sequence_gap: f64,
     pub nan: f64,
+    pub slow_parameters: Duration,
+    pub foreign: f64,
+    pub twin: f64,
     pub silences: Vec<Window>,
     pub power_cuts: Vec<Window>,
     pub baud_mismatches: Vec<Window>,
@@ -109,6 +115,9 @@ impl Default for Faults {
             ack_target: 0.0,
             sequence_gap: 0.0,
             nan: 0.0,
+            slow_parameters: Duration::ZERO,
+            foreign: 0.0,
+            twin: 0.0,
             silences: Vec::new(),
             power_cuts: Vec::new(),
             baud_mismatches: Vec::new(),

@@ -7,7 +7,8 @@ use super::{ClockJump, Faults, Window};
 use crate::timestamp::Timestamp;
 
 const WORDS: &str = "drop, deaf, duplicate, reorder, delay, jitter, corrupt, truncate, garbage, split, merge, ack-loss, \
-                     ack-delay, ack-target, sequence-gap, nan, silence, power-cut, baud-mismatch, reboot, clock-jump";
+                     ack-delay, ack-target, sequence-gap, nan, slow-parameters, foreign, twin, silence, power-cut, \
+                     baud-mismatch, reboot, clock-jump";
 
 const PROBABILITY: &str = "a probability from 0 to 1, for example 0.1";
 const DURATION: &str = "a duration, for example 250ms, 5s, 2min or 1h";
@@ -59,6 +60,9 @@ impl Faults {
             "ack-target" => self.ack_target = entry.probability("ack-target")?,
             "sequence-gap" => self.sequence_gap = entry.probability("sequence-gap")?,
             "nan" => self.nan = entry.probability("nan")?,
+            "slow-parameters" => self.slow_parameters = entry.duration("slow-parameters")?,
+            "foreign" => self.foreign = entry.probability("foreign")?,
+            "twin" => self.twin = entry.probability("twin")?,
             "silence" => self.silences.push(entry.window("silence")?),
             "power-cut" => self.power_cuts.push(entry.window("power-cut")?),
             "baud-mismatch" => self.baud_mismatches.push(entry.window("baud-mismatch")?),
@@ -179,7 +183,8 @@ mod tests {
     fn every_word_sets_its_fault() {
         let text = "drop=0.1,deaf=0.2,duplicate=0.3,reorder=0.4,delay=250ms,jitter=5ms,corrupt=0.5,\
                     truncate=0.6,garbage=0.7,split=0.8,merge=0.9,ack-loss=1,ack-delay=1s,ack-target=0.11,\
-                    sequence-gap=0.12,nan=0.13,silence=5s@20s,power-cut=1min@1h,baud-mismatch=2s@0s,reboot@1.5s,\
+                    slow-parameters=200ms,foreign=0.5,twin=0.25,sequence-gap=0.12,nan=0.13,silence=5s@20s,\
+                    power-cut=1min@1h,baud-mismatch=2s@0s,reboot@1.5s,\
                     clock-jump=-3s@4s";
         let window = |from, until| Window { from: Timestamp::from_secs(from), until: Timestamp::from_secs(until) };
 
@@ -200,6 +205,9 @@ mod tests {
             ack_delay: Duration::from_secs(1),
             ack_target: 0.11,
             sequence_gap: 0.12,
+            slow_parameters: Duration::from_millis(200),
+            foreign: 0.5,
+            twin: 0.25,
             nan: 0.13,
             silences: vec![window(20, 25)],
             power_cuts: vec![window(3600, 3660)],

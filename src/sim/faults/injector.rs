@@ -132,11 +132,21 @@ impl<P: Peer> FaultyPeer<P> {
         if self.sequence_shift != 0 {
             rewrite::shift_sequence(&mut frame, self.sequence_shift);
         }
-        let ack_delay = if is_ack { self.faults.ack_delay } else { Duration::ZERO };
-        if self.random.chance(self.faults.duplicate) {
-            self.put_on_the_line(frame.clone(), ack_delay);
+        let extra_delay = match rewrite::message_id(&frame) {
+            Some(message::COMMAND_ACK) => self.faults.ack_delay,
+            Some(message::PARAM_VALUE) => self.faults.slow_parameters,
+            _ => Duration::ZERO,
+        };
+        if self.random.chance(self.faults.foreign) {
+            self.put_on_the_line(rewrite::foreign_heartbeat(), Duration::ZERO);
         }
-        self.put_on_the_line(frame, ack_delay);
+        if self.random.chance(self.faults.twin) {
+            self.put_on_the_line(rewrite::attitude_of_twin(&frame, self.now), Duration::ZERO);
+        }
+        if self.random.chance(self.faults.duplicate) {
+            self.put_on_the_line(frame.clone(), extra_delay);
+        }
+        self.put_on_the_line(frame, extra_delay);
     }
 
     fn put_on_the_line(&mut self, mut bytes: Vec<u8>, extra_delay: Duration) {

@@ -3,14 +3,15 @@
 use mavlink_core::calculate_crc;
 
 use crate::sim::random::Random;
+use crate::timestamp::Timestamp;
 use crate::wire::dialect::{
     ATTITUDE_DATA, ATTITUDE_QUATERNION_DATA, AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA, COMMAND_ACK_DATA,
-    GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA, GLOBAL_POSITION_INT_DATA,
+    GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA,
     LOCAL_POSITION_NED_DATA, MessageData, SYSTEM_TIME_DATA,
 };
-use crate::wire::ids::message;
+use crate::wire::ids::{GimbalFlags, component, mav_autopilot, mav_state, mav_type, message};
 use crate::wire::target::message_shape;
-use crate::wire::{DatagramFrames, Frame, Version, encode_to_vec};
+use crate::wire::{DatagramFrames, Frame, MavId, Version, encode_to_vec};
 
 /// `LOCAL_POSITION_NED`.
 const LOCAL_POSITION_NED: u32 = LOCAL_POSITION_NED_DATA::ID;
@@ -18,6 +19,40 @@ const LOCAL_POSITION_NED: u32 = LOCAL_POSITION_NED_DATA::ID;
 /// The id of the message in `bytes`; `None` if they are no frame.
 pub fn message_id(bytes: &[u8]) -> Option<u32> {
     DatagramFrames::new(bytes).next_frame().map(|frame| frame.message_id())
+}
+
+/// A heartbeat of the autopilot of another vehicle, 99/1.
+pub fn foreign_heartbeat() -> Vec<u8> {
+    let heartbeat = HEARTBEAT_DATA {
+        custom_mode: 0,
+        mavtype: mav_type::QUADROTOR,
+        autopilot: mav_autopilot::PX4,
+        base_mode: 0,
+        system_status: mav_state::ACTIVE,
+        mavlink_version: 3,
+    };
+    encode_to_vec(MavId::new(99, 1), 0, &heartbeat)
+}
+
+/// What a second device under the ids of the sender of `bytes` says: it looks straight ahead, from its own start on.
+pub fn attitude_of_twin(bytes: &[u8], now: Timestamp) -> Vec<u8> {
+    let source =
+        DatagramFrames::new(bytes).next_frame().map_or(MavId::new(1, component::GIMBAL), |frame| frame.source());
+    let attitude = GIMBAL_DEVICE_ATTITUDE_STATUS_DATA {
+        time_boot_ms: now.boot_ms(),
+        q: [1.0, 0.0, 0.0, 0.0],
+        angular_velocity_x: f32::NAN,
+        angular_velocity_y: f32::NAN,
+        angular_velocity_z: f32::NAN,
+        failure_flags: 0,
+        flags: (GimbalFlags::ROLL_LOCK | GimbalFlags::PITCH_LOCK | GimbalFlags::YAW_IN_VEHICLE_FRAME).bits(),
+        target_system: 0,
+        target_component: 0,
+        delta_yaw: f32::NAN,
+        delta_yaw_velocity: f32::NAN,
+        gimbal_device_id: 0,
+    };
+    encode_to_vec(source, 0, &attitude)
 }
 
 /// Addresses a `COMMAND_ACK` to a component that did not ask.

@@ -1,6 +1,6 @@
 use super::*;
 use crate::wire::dialect::{COMMAND_ACK_DATA, HEARTBEAT_DATA};
-use crate::wire::dialect::{GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, MessageData};
+use crate::wire::dialect::{GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, MessageData, PARAM_VALUE_DATA};
 use crate::wire::{DatagramFrames, MavId, encode_to_vec};
 
 const SOURCE: MavId = MavId::new(1, 154);
@@ -239,4 +239,41 @@ fn acks_are_lost_late_or_for_somebody_else() {
     assert_eq!(acks("ack-delay=400ms"), [(400, 255, 190)]);
     assert_eq!(acks("ack-target=1"), [(0, 0, 191)]);
     assert_eq!(acks("deaf=1"), []);
+}
+
+/// Strangers on the line: another vehicle's autopilot, and a second device under the same ids.
+#[test]
+fn strangers_speak_before_the_peer() {
+    let sources = |sent: &[(Timestamp, Vec<u8>)]| -> Vec<(MavId, u32)> {
+        let frame = |bytes: &[u8]| {
+            let frame = DatagramFrames::new(bytes).next_frame().expect("a whole frame");
+            (frame.source(), frame.message_id())
+        };
+        sent.iter().map(|(_, bytes)| frame(bytes)).collect()
+    };
+    let stranger = (MavId::new(99, 1), HEARTBEAT_DATA::ID);
+    let own = (SOURCE, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA::ID);
+    assert_eq!(sources(&run("foreign=1", 20)), [stranger, own, stranger, own]);
+    assert_eq!(sources(&run("twin=1", 10)), [own, own]);
+}
+
+/// "flash-slow parameter writes (200 ms)": `PARAM_VALUE` comes late, and nothing else does.
+#[test]
+fn parameters_come_late_from_a_slow_memory() {
+    let mut peer = FaultyPeer::new(Beacon::default(), "slow-parameters=200ms".parse().expect("a fault"));
+    peer.handle_timeout(Timestamp::ZERO);
+    let value =
+        PARAM_VALUE_DATA { param_value: 1.0, param_count: 1, param_index: 0, param_id: "A".into(), param_type: 9 };
+    peer.peer.send(&value);
+    let ids = |sent: Vec<(Timestamp, Vec<u8>)>| -> Vec<(u64, u32)> {
+        let id = |bytes: &[u8]| DatagramFrames::new(bytes).next_frame().expect("a whole frame").message_id();
+        sent.iter().map(|(at, bytes)| (at.as_micros() / 1_000, id(bytes))).collect()
+    };
+
+    let sent = ids(run_peer(&mut peer, Timestamp::ZERO, Timestamp::from_millis(210)));
+
+    let late: Vec<_> = sent.iter().filter(|(_, id)| *id == PARAM_VALUE_DATA::ID).collect();
+    assert_eq!(late, [&(200, PARAM_VALUE_DATA::ID)]);
+    let prompt = sent.iter().filter(|(_, id)| *id == GIMBAL_DEVICE_ATTITUDE_STATUS_DATA::ID);
+    assert!(prompt.clone().count() >= 20 && prompt.clone().all(|(at, _)| at % 10 == 0));
 }
