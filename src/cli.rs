@@ -10,6 +10,7 @@ use crate::config::{DEFAULT_FILE, settings::HttpSettings};
 use crate::daemon::logging::LogFilter;
 use crate::endpoint::Endpoint;
 use crate::exit_code::ExitCode;
+use crate::sim::faults::WORDS;
 
 const ENDPOINTS: &str = "\
 Endpoints:
@@ -140,6 +141,9 @@ Examples:
   gimbald sim gimbal --endpoint udpout:127.0.0.1:14541
   gimbald sim gimbal --endpoint serial:/dev/ttyUSB1:115200 --component-id 171
   gimbald sim gimbal --endpoint tcpin:0.0.0.0:5790 --fault drop=0.1 --fault reboot@20s --seed 7
+
+Faults: {WORDS}.
+Each with a probability (drop=0.1), a duration (delay=250ms), or a time since the start (silence=5s@20s, reboot@20s).
 
 {ENDPOINTS}"))]
     Gimbal(SimGimbalArgs),

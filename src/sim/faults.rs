@@ -9,7 +9,7 @@ mod rewrite;
 
 use std::time::Duration;
 
-pub use grammar::FaultError;
+pub use grammar::{FaultError, WORDS};
 pub use injector::FaultyPeer;
 
 use crate::timestamp::Timestamp;

@@ -6,7 +6,8 @@ use std::time::Duration;
 use super::{ClockJump, Faults, Window};
 use crate::timestamp::Timestamp;
 
-const WORDS: &str = "drop, deaf, duplicate, reorder, delay, jitter, corrupt, truncate, garbage, split, merge, ack-loss, \
+/// The names of all faults, for people.
+pub const WORDS: &str = "drop, deaf, duplicate, reorder, delay, jitter, corrupt, truncate, garbage, split, merge, ack-loss, \
                      ack-delay, ack-target, sequence-gap, nan, slow-parameters, foreign, twin, silence, power-cut, \
                      baud-mismatch, reboot, clock-jump";
 
