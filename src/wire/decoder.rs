@@ -279,10 +279,6 @@ fn has_unknown_incompat_flag(bytes: &[u8]) -> bool {
 /// Whether `bytes` start with a whole and undamaged frame of the known message of `header`; `None` while that is open.
 fn checks_out(bytes: &[u8], header: &Header) -> Option<bool> {
     let shape = header.shape?;
-    // MAVLink 1 neither cuts zeros off nor adds to a message, so most false starts need not be waited for.
-    if header.version == Version::V1 && !(shape.base_len..=shape.max_len).contains(&header.payload_len) {
-        return Some(false);
-    }
     if bytes.len() < header.frame_len() {
         return None;
     }
@@ -392,6 +388,22 @@ mod tests {
 
         assert_eq!(decoder.next_frame().map(|frame| frame.bytes().to_vec()), Some(good));
         assert_eq!(decoder.poll_timeout(), None);
+    }
+
+    /// D13: "A CRC-valid frame of a known id is a valid frame", whatever its length, in MAVLink 1 too.
+    #[test]
+    fn a_checked_frame_is_a_frame_whatever_its_length() {
+        for len in [4_u8, 9, 12] {
+            let mut frame = vec![MAGIC_V1, len, 0, 1, 154, 0];
+            frame.extend(vec![3; usize::from(len)]);
+            // 50 is the CRC_EXTRA of HEARTBEAT.
+            let sum = Crc::new().add(&frame[1..]).finish(50);
+            frame.extend_from_slice(&sum.to_le_bytes());
+
+            let mut datagram = DatagramFrames::new(&frame);
+
+            assert_eq!(datagram.next_frame().map(|found| found.bytes().to_vec()), Some(frame.clone()), "{len} bytes");
+        }
     }
 
     fn heartbeat(sequence: u8) -> Vec<u8> {

@@ -82,6 +82,19 @@ fn udpout() {
     });
 }
 
+/// Whoever hears the broadcast answers.
+#[test]
+fn udpbcast() {
+    let site = Site::new();
+    let socket = std::net::UdpSocket::bind(site.port(14_604)).expect("nobody else has this address");
+    withstands(&format!("udpbcast:{}", site.port(14_604)), |_, _| {
+        socket.set_read_timeout(Some(PATIENCE)).expect("a time-out");
+        let (_, daemon) = socket.recv_from(&mut [0; 300]).expect("it speaks first");
+        // The daemon may be gone, which shows in the end.
+        Box::new(move |bytes| drop(socket.send_to(bytes, daemon)))
+    });
+}
+
 #[test]
 fn tcpin() {
     withstands("tcpin:{ip}:14602", |site, daemon| {
