@@ -140,6 +140,7 @@ pub enum SimCommand {
 Examples:
   gimbald sim gimbal --endpoint udpout:127.0.0.1:14541
   gimbald sim gimbal --endpoint serial:/dev/ttyUSB1:115200 --component-id 171
+  gimbald sim gimbal --endpoint udpout:127.0.0.1:14540 --system-id 33 --slew 80 --yaw-range 160
   gimbald sim gimbal --endpoint tcpin:0.0.0.0:5790 --fault drop=0.1 --fault reboot@20s --seed 7
 
 Faults: {WORDS}.
@@ -185,8 +186,20 @@ pub struct SimGimbalArgs {
     pub seed: u64,
 
     /// How the gimbal reads the yaw of a setpoint
-    #[arg(long, value_name = "FRAMES", value_enum, default_value_t = SimulatedFrames::Strict)]
+    #[arg(long, value_name = "FRAMES", value_enum, default_value_t = SimulatedFrames::Legacy)]
     pub frames: SimulatedFrames,
+
+    /// From where the gimbal counts the yaw that it reports
+    #[arg(long, value_name = "FRAME", value_enum, default_value_t = SimulatedStatusFrame::Earth)]
+    pub status_frame: SimulatedStatusFrame,
+
+    /// How fast the gimbal turns at most, degrees per second
+    #[arg(long, value_name = "DPS", default_value_t = 100.0, value_parser = slew)]
+    pub slew: f64,
+
+    /// How far the gimbal yaws to either side, degrees; without it, it turns without end
+    #[arg(long, value_name = "DEG", value_parser = yaw_range)]
+    pub yaw_range: Option<f64>,
 }
 
 #[derive(Debug, Args)]
@@ -239,12 +252,22 @@ pub enum SimulatedFamily {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum SimulatedFrames {
-    /// Knows YAW_LOCK only, not the frame flags
+    /// By its frame flag; without one, from North with YAW_LOCK, else from the vehicle's nose
     Legacy,
-    /// Takes exactly what the frame flags say
+    /// By its frame flag; a setpoint without one has no effect
     Strict,
-    /// Takes yaw in the vehicle frame only
+    /// From the vehicle's nose; a setpoint from North has no effect
     VehicleOnly,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SimulatedStatusFrame {
+    /// From North as soon as the autopilot tells the heading, until then from the vehicle's nose
+    Earth,
+    /// From North while a setpoint locks yaw and the heading is known, else from the vehicle's nose
+    Lock,
+    /// As devices without frame flags: from North while yaw is locked, else from the vehicle's nose, and no delta_yaw
+    Legacy,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -252,6 +275,27 @@ pub enum SimulatedAutopilot {
     Px4,
     #[value(name = "ardupilot")]
     ArduPilot,
+}
+
+/// Why a number of degrees is none that the simulation can work with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("expected a number from {least} to {most}")]
+pub struct DegreesError {
+    least: u16,
+    most: u16,
+}
+
+fn slew(text: &str) -> Result<f64, DegreesError> {
+    degrees(text, 1, 1000)
+}
+
+fn yaw_range(text: &str) -> Result<f64, DegreesError> {
+    degrees(text, 1, 360)
+}
+
+fn degrees(text: &str, least: u16, most: u16) -> Result<f64, DegreesError> {
+    let within = |degrees: &f64| (f64::from(least)..=f64::from(most)).contains(degrees);
+    text.parse().ok().filter(within).ok_or(DegreesError { least, most })
 }
 
 impl Cli {
@@ -298,6 +342,9 @@ mod tests {
             ("gimbald sim gimbal", ExitCode::Usage),
             ("gimbald sim gimbal --endpoint /dev/ttyUSB0", ExitCode::Usage),
             ("gimbald sim vehicle --endpoint udpin:127.0.0.1:1 --system-id 0", ExitCode::Usage),
+            ("gimbald sim gimbal --endpoint udpin:127.0.0.1:1 --slew 0", ExitCode::Usage),
+            ("gimbald sim gimbal --endpoint udpin:127.0.0.1:1 --slew NaN", ExitCode::Usage),
+            ("gimbald sim gimbal --endpoint udpin:127.0.0.1:1 --yaw-range 361", ExitCode::Usage),
             ("gimbald demo --duration 0", ExitCode::Usage),
         ] {
             assert_eq!(read(line).map(|_| ()), Err(code), "{line}");

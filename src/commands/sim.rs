@@ -3,17 +3,23 @@
 use std::io::Write;
 use std::time::Duration;
 
-use crate::cli::{SimCommand, SimGimbalArgs, SimVehicleArgs, SimulatedAutopilot, SimulatedFamily, SimulatedFrames};
+use crate::cli::{
+    SimCommand, SimGimbalArgs, SimVehicleArgs, SimulatedAutopilot, SimulatedFamily, SimulatedFrames,
+    SimulatedStatusFrame,
+};
 use crate::daemon::clock::unix_time_us;
 use crate::endpoint::Endpoint;
 use crate::exit_code::ExitCode;
-use crate::gimbals::mavlink_v2::sim::{Device, DeviceSettings, Strictness, SystemId};
+use crate::geometry::{Angle, AngularRate, AxisLimits, Limits};
+use crate::gimbals::mavlink_v2::sim::{Device, DeviceSettings, StatusFrame, Strictness, SystemId};
 use crate::links;
 use crate::sim::faults::{Faults, FaultyPeer};
 use crate::sim::host;
 use crate::sim::peer::Peer;
+use crate::sim::plant::PlantSettings;
 use crate::sim::vehicle::{Autopilot, Vehicle, VehicleSettings};
 use crate::timestamp::Timestamp;
+use crate::wire::ids::CapFlags;
 
 /// Runs the simulated peer until SIGTERM or SIGINT.
 pub fn sim(command: &SimCommand, errors: &mut impl Write) -> ExitCode {
@@ -41,17 +47,33 @@ pub fn run_sim_gimbal(arguments: &SimGimbalArgs, errors: &mut impl Write) -> Exi
 }
 
 fn device_settings(arguments: &SimGimbalArgs) -> DeviceSettings {
+    let defaults = DeviceSettings::default();
+    let yaw = arguments.yaw_range.map(Angle::from_degrees).and_then(|range| AxisLimits::new(-range, range));
     DeviceSettings {
         component_id: arguments.component_id,
         system_id: SystemId::Fixed(arguments.system_id),
         // Its id is settled, and on some endpoints nobody can speak before it does.
         listens_first: Some(Duration::ZERO),
+        capabilities: if yaw.is_some() {
+            defaults.capabilities.difference(CapFlags::SUPPORTS_INFINITE_YAW)
+        } else {
+            defaults.capabilities
+        },
         strictness: match arguments.frames {
             SimulatedFrames::Legacy => Strictness::Legacy,
             SimulatedFrames::Strict => Strictness::Strict,
             SimulatedFrames::VehicleOnly => Strictness::VehicleOnly,
         },
-        ..DeviceSettings::default()
+        status_frame: match arguments.status_frame {
+            SimulatedStatusFrame::Earth => StatusFrame::EarthWhenKnown,
+            SimulatedStatusFrame::Lock => StatusFrame::FollowsLock,
+            SimulatedStatusFrame::Legacy => StatusFrame::Legacy,
+        },
+        plant: PlantSettings {
+            limits: Limits { yaw, ..defaults.plant.limits },
+            ..defaults.plant.clone().with_max_rate(AngularRate::from_degrees_per_second(arguments.slew))
+        },
+        ..defaults
     }
 }
 
@@ -85,6 +107,45 @@ mod tests {
 
     use super::*;
     use crate::cli::{Cli, Command};
+
+    fn settings(options: &[&str]) -> DeviceSettings {
+        let line = ["gimbald", "sim", "gimbal", "--endpoint", "udpin:127.0.0.1:0"].iter().chain(options);
+        let Ok(Cli { command: Command::Sim(SimCommand::Gimbal(arguments)), .. }) = Cli::try_parse_from(line) else {
+            panic!("it parses")
+        };
+        device_settings(&arguments)
+    }
+
+    /// Without options it is the device that the tests of the simulation know, and passes MAVSDK's tester; each option
+    /// changes one thing.
+    #[test]
+    fn options_make_the_device() {
+        let usual = DeviceSettings {
+            system_id: SystemId::Fixed(1),
+            listens_first: Some(Duration::ZERO),
+            ..DeviceSettings::default()
+        };
+        assert_eq!(settings(&[]), usual);
+
+        let system_id = SystemId::Fixed(33);
+        assert_eq!(settings(&["--system-id", "33"]), DeviceSettings { system_id, ..usual.clone() });
+        assert_eq!(settings(&["--component-id", "171"]), DeviceSettings { component_id: 171, ..usual.clone() });
+        for (word, strictness) in [("strict", Strictness::Strict), ("vehicle-only", Strictness::VehicleOnly)] {
+            assert_eq!(settings(&["--frames", word]), DeviceSettings { strictness, ..usual.clone() });
+        }
+        for (word, status_frame) in [("lock", StatusFrame::FollowsLock), ("legacy", StatusFrame::Legacy)] {
+            assert_eq!(settings(&["--status-frame", word]), DeviceSettings { status_frame, ..usual.clone() });
+        }
+
+        let slow = settings(&["--slew", "20"]);
+        assert_eq!(slow.plant.max_rate, AngularRate::from_degrees_per_second(20.0));
+        assert_eq!(slow.plant.max_acceleration, usual.plant.max_acceleration / 5.0);
+        assert_eq!(DeviceSettings { plant: usual.plant.clone(), ..slow }, usual);
+
+        let limited = settings(&["--yaw-range", "160"]);
+        assert_eq!(limited.plant.limits.yaw, AxisLimits::new(Angle::from_degrees(-160.0), Angle::from_degrees(160.0)));
+        assert_eq!(limited.capabilities, usual.capabilities.difference(CapFlags::SUPPORTS_INFINITE_YAW));
+    }
 
     /// "78 configuration, 64 usage": a fault that does not exist is a wrong argument.
     #[test]

@@ -55,11 +55,22 @@ pub struct PlantSettings {
     pub seed: u64,
 }
 
+/// How much of its greatest rate a joint gains within a second.
+const ACCELERATION_PER_RATE: f64 = 8.0;
+
+impl PlantSettings {
+    /// With joints of this greatest rate, which they reach as soon as others reach theirs.
+    pub fn with_max_rate(self, max_rate: AngularRate) -> Self {
+        Self { max_rate, max_acceleration: ACCELERATION_PER_RATE * max_rate.radians_per_second(), ..self }
+    }
+}
+
 impl Default for PlantSettings {
     fn default() -> Self {
+        let max_rate = AngularRate::from_degrees_per_second(100.0);
         Self {
-            max_rate: AngularRate::from_degrees_per_second(100.0),
-            max_acceleration: 800_f64.to_radians(),
+            max_rate,
+            max_acceleration: ACCELERATION_PER_RATE * max_rate.radians_per_second(),
             limits: Limits::default(),
             initial: GimbalAngles::default(),
             noise: Angle::from_degrees(0.02),

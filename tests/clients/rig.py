@@ -241,7 +241,7 @@ listen = "{self._listen}"
         )
         system_id = str(self._system_id)
         vehicle = ["--endpoint", f"udpout:127.0.0.1:{self.wire.port}", "--autopilot", self._autopilot]
-        gimbal = ["--endpoint", f"serial:{self.cable.peer_path}:115200"]
+        gimbal = ["--endpoint", f"serial:{self.cable.peer_path}:115200", "--frames", "strict"]
         try:
             self.daemon = self._start("daemon", "--log", "debug", "run", "--config", str(config))
             self._start("vehicle", "sim", "vehicle", "--system-id", system_id, *vehicle)

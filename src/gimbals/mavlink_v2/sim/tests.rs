@@ -3,7 +3,7 @@ use crate::geometry::{AircraftAngles, AxisLimits, GimbalAngles, Limits};
 use crate::sim::plant::PlantSettings;
 use crate::wire::dialect::{
     COMMAND_ACK_DATA, COMMAND_LONG_DATA, CharArray, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA,
-    MESSAGE_INTERVAL_DATA, MessageData, PARAM_REQUEST_LIST_DATA, PARAM_VALUE_DATA,
+    GIMBAL_DEVICE_SET_ATTITUDE_DATA, MESSAGE_INTERVAL_DATA, MessageData, PARAM_REQUEST_LIST_DATA, PARAM_VALUE_DATA,
 };
 use crate::wire::ids::GimbalFlags;
 use crate::wire::{DatagramFrames, encode_to_vec};

@@ -135,3 +135,19 @@ fn a_restart_forgets_the_manager_and_the_clock() {
     assert_eq!(status.time_boot_ms, 250);
     assert_eq!(Status::from(&status).failures, FailureFlags::NO_MANAGER);
 }
+
+/// MAVSDK's tester looks for the type 0.1 to 0.3 s after its first setpoint, which is sooner than once a second.
+#[test]
+fn a_new_manager_gets_a_heartbeat_with_its_first_setpoint() {
+    let mut bench = Bench::new(|_| {});
+    bench.run_until(millis(10));
+
+    for (source, later, expected) in
+        [(MANAGER, 0, &["HEARTBEAT"][..]), (MANAGER, 0, &[]), (RIVAL, 0, &[]), (RIVAL, 2000, &["HEARTBEAT"])]
+    {
+        bench.run_for(later);
+        bench.sent.clear();
+        bench.hear(source, &angles(FOLLOW, -20.0, 0.0));
+        assert_eq!(bench.names(), expected, "{source} after {later} ms");
+    }
+}
