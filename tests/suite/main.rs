@@ -8,6 +8,7 @@ mod daemon;
 mod daemon_pacing;
 mod demo;
 mod dialect_oracle;
+mod gimbal_manager_document;
 mod gimbald;
 mod pacing;
 mod properties;
