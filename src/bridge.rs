@@ -11,6 +11,7 @@ mod identity;
 mod outbox;
 pub mod pacing;
 mod picture;
+mod rates;
 mod roster;
 mod sent;
 pub mod settings;
@@ -191,6 +192,7 @@ impl Bridge {
             }
         }
         self.carry_out(now);
+        self.channels.release_held(now, &mut self.outbox);
         self.channels.pump_all(now, &mut self.outbox);
     }
 
@@ -289,6 +291,7 @@ impl Bridge {
         let system = self.identity.system();
         tracing::info!(system_id = system, fallback = self.identity.is_bootstrap(), "system id");
         self.router.set_own_system(system);
+        self.channels.forget_held();
         if let Some(before) = before {
             self.router.forget_system(before);
             let around = surroundings(&self.vehicle, self.autopilot);
@@ -402,6 +405,7 @@ impl Bridge {
         self.carry_out(now);
         // The goodbye is the last word.
         self.channels.keep_control();
+        self.channels.lift_limits();
         if self.identity.system().is_some() {
             for at in 0..self.roster.len() {
                 let gimbal = self.roster.get_mut(at);
@@ -440,11 +444,13 @@ impl Bridge {
 
     fn carry_out_for_manager(&mut self, now: Timestamp, at: usize, component: u8, output: ManagerOutput) {
         match output {
-            ManagerOutput::Reply { to, message } => {
-                let channels = self.router.route_own(now, Target::new(to.system, to.component));
-                self.send(now, channels, component, &message);
+            ManagerOutput::Reply { to, channel, message } => {
+                // Who cannot be learned, such as a component 0, is where it spoke.
+                let known = self.router.route_known(now, to);
+                let channels = if known.is_empty() { channel.into() } else { known };
+                self.answer(now, channels, component, &message);
             }
-            ManagerOutput::Answer { channel, message } => self.send(now, channel.into(), component, &message),
+            ManagerOutput::Answer { channel, message } => self.answer(now, channel.into(), component, &message),
             ManagerOutput::Broadcast { channels, message } => {
                 let mut channels = channels.unwrap_or(self.channels.open_set());
                 if !matches!(*message, MavMessage::GIMBAL_MANAGER_STATUS(_)) {
@@ -455,7 +461,7 @@ impl Bridge {
             }
             ManagerOutput::Heartbeat { channel } => {
                 let message = heartbeat::heartbeat(self.roster.get_mut(at), self.identity.is_bootstrap());
-                self.send(now, channel.into(), component, &message);
+                self.answer(now, channel.into(), component, &message);
             }
             ManagerOutput::Steer(setpoint) => self.roster.get_mut(at).driver.handle_setpoint(now, setpoint),
         }
@@ -469,6 +475,14 @@ impl Bridge {
     fn send(&mut self, now: Timestamp, channels: ChannelSet, component: u8, message: &MavMessage) {
         if let Some(system) = self.identity.system() {
             self.send_as(now, system, channels, component, message);
+        }
+    }
+
+    /// Sends what was asked for, numbered for each channel.
+    fn answer(&mut self, now: Timestamp, channels: ChannelSet, component: u8, message: &MavMessage) {
+        if let Some(system) = self.identity.system() {
+            let frame = self.buffer.encode_any(MavId::new(system, component), 0, message);
+            self.channels.transmit_answer(now, channels, &frame, &mut self.outbox);
         }
     }
 

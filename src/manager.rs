@@ -62,9 +62,10 @@ pub struct Surroundings<'a> {
 /// What a manager wants done.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ManagerOutput {
-    /// To be sent to where `to` is known.
+    /// To be sent to where `to` is known, or else on the channel on which it asked.
     Reply {
         to: MavId,
+        channel: ChannelId,
         message: Box<MavMessage>,
     },
     /// To be sent on the channel of the one who asked.

@@ -6,19 +6,17 @@ use std::time::Duration;
 use super::LinkIndex;
 use super::outbox::Outbox;
 use super::pacing::{Departure, Origin, SerialQueue};
+use super::rates::RateLimits;
 use super::sent::SentFrames;
 use super::settings::{LinkSettings, Role, Transport};
 use crate::channel::{ChannelId, ChannelSet};
 use crate::timestamp::Timestamp;
 use crate::wire::decoder::Patience;
 use crate::wire::encoder::renumber;
-use crate::wire::{Frame, MAX_FRAME_LEN, MavId, StreamDecoder, WireCounters};
+use crate::wire::{DatagramFrames, Frame, MAX_FRAME_LEN, StreamDecoder, WireCounters};
 
 /// A stream that is no serial line may hold the rest of a frame back for so long.
 const STREAM_PATIENCE: Duration = Duration::from_secs(1);
-
-/// So many pairs of message and source are limited in rate on one link.
-const MAX_RATE_ENTRIES: usize = 256;
 
 /// One open conversation.
 #[derive(Debug)]
@@ -30,6 +28,7 @@ pub struct Channel {
     pub queue: Option<SerialQueue>,
     pub last_heard: Option<Timestamp>,
     sequences: Sequences,
+    rates: RateLimits,
 }
 
 /// The next sequence number of each of our components on one channel.
@@ -66,7 +65,6 @@ pub struct Link {
     /// Of channels that are closed; those of open streams are added when shown.
     pub wire: WireCounters,
     pub dropped: BTreeMap<&'static str, u64>,
-    rates: Vec<(u32, MavId, Timestamp)>,
 }
 
 impl Link {
@@ -81,32 +79,11 @@ impl Link {
             tx_bytes: 0,
             wire: WireCounters::default(),
             dropped: BTreeMap::new(),
-            rates: Vec::new(),
         }
     }
 
     pub fn count_dropped(&mut self, reason: &'static str) {
         *self.dropped.entry(reason).or_default() += 1;
-    }
-
-    /// Whether a message may pass to this link now under its `max_rate_hz`; if so, it counts as sent.
-    fn admit(&mut self, now: Timestamp, message_id: u32, source: MavId) -> bool {
-        let Some(interval) = self.settings.max_rates.get(&message_id) else { return true };
-        match self.rates.iter_mut().find(|(id, from, _)| *id == message_id && *from == source) {
-            Some((_, _, next)) if *next > now => false,
-            Some((_, _, next)) => {
-                // A message a little late must not shift those behind it.
-                *next = (*next + *interval).max(now + interval.mul_f64(0.5));
-                true
-            }
-            None => {
-                if self.rates.len() >= MAX_RATE_ENTRIES {
-                    self.rates.clear();
-                }
-                self.rates.push((message_id, source, now + *interval));
-                true
-            }
-        }
     }
 }
 
@@ -202,8 +179,8 @@ impl Channels {
             self.limited.insert(channel);
         }
         let address = address.to_owned();
-        let channel_state =
-            Channel { link, address, decoder, queue, last_heard: None, sequences: Sequences::default() };
+        let (sequences, rates) = (Sequences::default(), RateLimits::default());
+        let channel_state = Channel { link, address, decoder, queue, last_heard: None, sequences, rates };
         self.channels[channel.index()] = Some(channel_state);
         true
     }
@@ -227,18 +204,57 @@ impl Channels {
         }
     }
 
-    /// R19: takes the channels out of `wanted` whose link has had its share of this message; they are counted.
+    /// R19: takes the channels out of `wanted` that had their share of this message; they are counted.
     pub fn limit_rate(&mut self, now: Timestamp, wanted: ChannelSet, frame: &Frame<'_>) -> ChannelSet {
         let mut admitted = wanted;
         for channel in wanted.intersection(self.limited) {
-            let Some(link) = self.channels[channel.index()].as_ref().map(|channel| channel.link) else { continue };
-            let link = &mut self.links[link];
-            if !link.admit(now, frame.message_id(), frame.source()) {
-                link.count_dropped("max_rate");
+            if !self.admit(now, channel, frame) {
+                self.count_dropped(channel, "max_rate");
                 admitted.remove(channel);
             }
         }
         admitted
+    }
+
+    fn admit(&mut self, now: Timestamp, channel: ChannelId, frame: &Frame<'_>) -> bool {
+        let Some(state) = self.channels[channel.index()].as_mut() else { return true };
+        let Some(interval) = self.links[state.link].settings.max_rates.get(&frame.message_id()) else { return true };
+        state.rates.admit(now, *interval, frame.message_id(), frame.source())
+    }
+
+    /// Keeps a frame of our own until its turn comes, in the place of an older one.
+    fn hold(&mut self, channel: ChannelId, frame: &Frame<'_>) {
+        let Some(state) = self.channels[channel.index()].as_mut() else { return };
+        if state.rates.hold(frame.message_id(), frame.source(), frame.bytes()) {
+            self.count_dropped(channel, "max_rate");
+        }
+    }
+
+    /// From now on nothing is limited in rate, and nothing waits for its turn: the end has come.
+    pub fn lift_limits(&mut self) {
+        self.forget_held();
+        self.limited = ChannelSet::EMPTY;
+    }
+
+    /// Forgets what waits for its turn under `max_rate_hz`.
+    pub fn forget_held(&mut self) {
+        for channel in self.limited {
+            if let Some(state) = self.channel_mut(channel) {
+                state.rates.forget_held();
+            }
+        }
+    }
+
+    /// Gives out those of our own frames whose turn under `max_rate_hz` has come.
+    pub fn release_held(&mut self, now: Timestamp, outbox: &mut Outbox) {
+        for channel in self.limited {
+            while let Some(bytes) = self.channel_mut(channel).and_then(|state| state.rates.take_due(now)) {
+                let mut frames = DatagramFrames::new(&bytes);
+                if let Some(frame) = frames.next_frame() {
+                    self.transmit_own(now, channel.into(), &frame, outbox);
+                }
+            }
+        }
     }
 
     /// R12: gives `frame` out on `wanted` byte for byte: at once where the line is not paced, else when it is its turn.
@@ -254,22 +270,37 @@ impl Channels {
         }
     }
 
-    /// Gives a frame of our own out on `wanted`, numbered for each channel.
+    /// Gives a frame of our own out on `wanted`, numbered for each channel; where it comes too soon, when it is its turn.
     pub fn transmit_own(&mut self, now: Timestamp, wanted: ChannelSet, frame: &Frame<'_>, outbox: &mut Outbox) {
-        for channel in self.limit_rate(now, wanted.intersection(self.open), frame) {
-            if self.paced.contains(channel) {
-                self.enqueue(now, channel, frame, Origin::Own, outbox);
-                continue;
+        for channel in wanted.intersection(self.open) {
+            if self.limited.contains(channel) && !self.admit(now, channel, frame) {
+                self.hold(channel, frame);
+            } else {
+                self.depart(now, channel, frame, outbox);
             }
-            let Some(state) = self.channels[channel.index()].as_mut() else { continue };
-            let mut numbered = [0; MAX_FRAME_LEN];
-            let numbered = &mut numbered[..frame.bytes().len()];
-            numbered.copy_from_slice(frame.bytes());
-            state.sequences.number(numbered);
-            self.sent.note(numbered);
-            self.count_sent(channel, numbered.len());
-            outbox.push_frame(channel.into(), numbered);
         }
+    }
+
+    /// The same for what somebody asked for, who waits for it: as often as it is asked for.
+    pub fn transmit_answer(&mut self, now: Timestamp, wanted: ChannelSet, frame: &Frame<'_>, outbox: &mut Outbox) {
+        for channel in wanted.intersection(self.open) {
+            self.depart(now, channel, frame, outbox);
+        }
+    }
+
+    fn depart(&mut self, now: Timestamp, channel: ChannelId, frame: &Frame<'_>, outbox: &mut Outbox) {
+        if self.paced.contains(channel) {
+            self.enqueue(now, channel, frame, Origin::Own, outbox);
+            return;
+        }
+        let Some(state) = self.channels[channel.index()].as_mut() else { return };
+        let mut numbered = [0; MAX_FRAME_LEN];
+        let numbered = &mut numbered[..frame.bytes().len()];
+        numbered.copy_from_slice(frame.bytes());
+        state.sequences.number(numbered);
+        self.sent.note(numbered);
+        self.count_sent(channel, numbered.len());
+        outbox.push_frame(channel.into(), numbered);
     }
 
     /// Whether we sent exactly these bytes lately.
@@ -314,6 +345,12 @@ impl Channels {
         }
     }
 
+    fn count_dropped(&mut self, channel: ChannelId, reason: &'static str) {
+        if let Some(link) = self.channels[channel.index()].as_ref().map(|channel| channel.link) {
+            self.links[link].count_dropped(reason);
+        }
+    }
+
     /// Before the goodbye: of what waits for a paced line only control still goes out.
     pub fn keep_control(&mut self) {
         for channel in self.paced {
@@ -328,10 +365,11 @@ impl Channels {
         self.poll_output_timeout().is_none()
     }
 
-    /// When a paced line has room, or a stream's unfinished frame is to be given up.
+    /// When a paced line has room, a frame's turn comes, or a stream's unfinished frame is to be given up.
     pub fn poll_timeout(&self) -> Option<Timestamp> {
         let decoders = self.streams.filter_map(|channel| self.channel(channel)?.decoder.as_ref()?.poll_timeout());
-        decoders.chain(self.poll_output_timeout()).min()
+        let held = self.limited.filter_map(|channel| self.channel(channel)?.rates.poll_timeout());
+        decoders.chain(held).chain(self.poll_output_timeout()).min()
     }
 
     /// When a paced line has room.

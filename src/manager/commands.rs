@@ -54,7 +54,7 @@ impl GimbalManager {
         }
         // The answer comes before what was asked for.
         let message = Box::new(messages::ack(sender.id, command.number, result));
-        self.outputs.insert(first_answer, ManagerOutput::Reply { to: sender.id, message });
+        self.outputs.insert(first_answer, ManagerOutput::Reply { to: sender.id, channel: sender.channel, message });
     }
 
     /// A command about the gimbal itself; all but CONFIGURE pass the gate.

@@ -81,6 +81,12 @@ impl Router {
         self.reachable(target).intersection(self.open)
     }
 
+    /// The channels on which exactly `id` was heard.
+    pub fn route_known(&mut self, now: Timestamp, id: MavId) -> ChannelSet {
+        self.routes.expire(now);
+        self.routes.component_channels(id).intersection(self.open)
+    }
+
     fn reachable(&self, target: Target) -> ChannelSet {
         match target {
             // R2: no target, or target system 0, is for everybody. R6: so is a message that is not known.

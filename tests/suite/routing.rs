@@ -1,9 +1,11 @@
 //! Where frames go: the routing items of the protocol checklist and the numbered rules of `docs/routing.md`.
 
+mod answers;
 mod firewall;
 mod forwarding;
 mod gimbal_links;
 mod known_routes;
+mod narrow_links;
 mod own_ids;
 mod rules_document;
 

@@ -2,12 +2,11 @@
 
 use std::time::Duration;
 
-use gimbald::bridge::settings::{Role, Settings, SystemId, Transport};
 use gimbald::wire::MavId;
 
 use super::*;
 use crate::support::wire::frame_v1;
-use crate::support::world::{AUTOPILOT, GIMBAL, link};
+use crate::support::world::{AUTOPILOT, GIMBAL};
 
 /// Protocol checklist 8: "When one bit of a known message's payload is flipped, the frame is neither processed nor
 /// forwarded, and the crc-error counter of that link rises by one."
@@ -244,29 +243,4 @@ fn item_134_an_answer_to_somebody_else_is_only_forwarded() {
     assert!(unanswered >= 4, "it is asked again and again: {unanswered}");
     assert_eq!(requests(Some((255, 190))), unanswered);
     assert!(requests(Some((1, 191))) < unanswered);
-}
-
-/// `max_rate_hz = { 285 = 4 }`: "what a narrow radio can carry, by message id".
-#[test]
-fn max_rate_hz_limits_one_message_on_one_link() {
-    let mut ground = link("ground", Role::Ground, Transport::Datagrams);
-    ground.max_rates.insert(285, Duration::from_millis(250));
-    let links = vec![
-        link("autopilot", Role::Autopilot, Transport::Datagrams),
-        link("gimbal", Role::Gimbal, Transport::Datagrams),
-        ground,
-        link("radio", Role::Ground, Transport::Datagrams),
-    ];
-    let mut rig = Rig::with(Settings { system_id: SystemId::Fixed(1), links, ..Settings::default() });
-    let mut received = (0, 0, 0);
-    for _ in 0..200 {
-        let status = rig.deliver_amid_ours("gimbal", &addressed(GIMBAL, 285, (0, 0)));
-        received.0 += usize::from(status.contains(&"ground"));
-        received.1 += usize::from(status.contains(&"radio"));
-        let other = rig.deliver_amid_ours("gimbal", &broadcast(GIMBAL, 265));
-        received.2 += usize::from(other.contains(&"ground"));
-        rig.run_for(Duration::from_millis(20));
-    }
-    assert_eq!(received, (16, 200, 200));
-    assert_eq!(rig.dropped("ground", "max_rate"), 184);
 }

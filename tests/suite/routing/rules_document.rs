@@ -5,12 +5,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The files whose comments carry the numbers of rules.
-const NUMBERED: [&str; 5] = [
+const NUMBERED: [&str; 6] = [
     "src/router/routes.rs",
     "src/router/rules.rs",
     "src/bridge/channels.rs",
     "src/bridge/delivery.rs",
     "src/bridge/pacing.rs",
+    "src/bridge/rates.rs",
 ];
 
 /// Every rule in the code is a section of the document, and the other way round.
