@@ -255,9 +255,10 @@ fn say(to: &mut impl Write, line: fmt::Arguments<'_>) {
 #[cfg(test)]
 mod tests {
     use std::fs::File;
-    use std::net::TcpListener;
+    use std::net::{Ipv4Addr, SocketAddr, TcpListener};
     use std::os::fd::{AsFd, OwnedFd};
     use std::os::unix::fs::symlink;
+    use std::sync::LazyLock;
     use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
     use std::thread::JoinHandle;
     use std::time::Duration;
@@ -266,6 +267,7 @@ mod tests {
     use nix::fcntl::{FcntlArg, OFlag, fcntl};
     use nix::pty::openpty;
     use nix::unistd::{read, ttyname, write};
+    use socket2::{Domain, Socket, Type};
 
     use super::*;
     use crate::gimbals::mavlink_v2::sim::{Device, DeviceSettings};
@@ -334,9 +336,15 @@ mod tests {
     }
 
     /// An address where no daemon answers.
+    /// A port where nobody listens, and that nobody else can get while the tests run.
     fn no_daemon() -> String {
-        let free = TcpListener::bind("127.0.0.1:0").expect("a port");
-        format!("http://{}", free.local_addr().expect("it is bound"))
+        static TAKEN: LazyLock<Socket> = LazyLock::new(|| {
+            let socket = Socket::new(Domain::IPV4, Type::STREAM, None).expect("a socket");
+            socket.bind(&SocketAddr::from((Ipv4Addr::LOCALHOST, 0)).into()).expect("a free port");
+            socket
+        });
+        let address = TAKEN.local_addr().expect("it is bound").as_socket().expect("of IP");
+        format!("http://{address}")
     }
 
     fn scan_at(path: &Path, daemon: &str) -> (Result<(), ScanError>, String, String) {
