@@ -2,6 +2,7 @@
 
 import signal
 import sys
+import threading
 import time
 import traceback
 
@@ -37,10 +38,11 @@ def angle_between(one, other):
 
 
 class Steps:
-    """Runs steps, counts them, and ends the script with the code that they deserve."""
+    """Runs steps, counts them, and ends the script with the code that they deserve. Steps may run on several threads."""
 
     def __init__(self, prefix):
         self._prefix = prefix
+        self._lock = threading.Lock()
         self._failed = 0
         # The clean-up of every `with` has to run also when the time of the script is over.
         signal.signal(signal.SIGTERM, lambda *_: sys.exit("stopped from outside"))
@@ -57,15 +59,20 @@ class Steps:
             self._fail(name, f"{type(error).__name__}: {error}")
         else:
             remark = f" ({remark})" if remark else ""
-            print(f"ok {self._prefix}: {name}{remark}", flush=True)
+            self._say(f"ok {self._prefix}: {name}{remark}")
             print(f"{name}: {time.monotonic() - started:.2f} s", file=sys.stderr, flush=True)
             return
         if essential:
             raise Stopped(name)
 
     def _fail(self, name, reason):
-        self._failed += 1
-        print(f"FAILED {self._prefix}: {name}: {' '.join(reason.split())}", flush=True)
+        with self._lock:
+            self._failed += 1
+        self._say(f"FAILED {self._prefix}: {name}: {' '.join(reason.split())}")
+
+    def _say(self, line):
+        with self._lock:
+            print(line, flush=True)
 
     def script(self, body):
         """Runs the whole script."""
