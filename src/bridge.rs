@@ -21,6 +21,7 @@ mod streams;
 pub use crate::channel::{ChannelId, ChannelSet};
 use crate::gimbals::DriverOutput;
 use crate::gimbals::mavlink_v2::packet;
+use crate::manager::rank::Ranks;
 use crate::manager::{ManagerOutput, Surroundings, messages};
 use crate::router::Router;
 use crate::timers::TimerTable;
@@ -97,6 +98,7 @@ pub struct Bridge {
     autopilot: Option<MavId>,
     /// By system, the component that beats as its autopilot, and when it last did.
     vehicles: Vec<Option<(u8, Timestamp)>>,
+    ranks: Ranks,
     roster: Roster,
     streams: AutopilotStreams,
     conflicts: Conflicts,
@@ -122,6 +124,7 @@ impl Bridge {
             vehicle: Vehicle::new(),
             autopilot: None,
             vehicles: vec![None; 256],
+            ranks: Ranks::default(),
             roster: Roster::new(&settings),
             streams: AutopilotStreams::default(),
             conflicts: Conflicts::default(),
@@ -133,6 +136,7 @@ impl Bridge {
             settings,
         };
         bridge.router.set_own_system(bridge.identity.system());
+        bridge.ranks.set_own_system(bridge.identity.system());
         bridge.timers.set(Timer::Heartbeat, now);
         bridge
     }
@@ -184,7 +188,7 @@ impl Bridge {
         }
         self.ask_autopilot(now);
         for at in 0..self.roster.len() {
-            let around = surroundings(&self.vehicle, self.autopilot);
+            let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
             let gimbal = self.roster.get_mut(at);
             gimbal.driver.handle_timeout(now);
             if gimbal.manager.poll_timeout().is_some_and(|due| due <= now) && self.identity.system().is_some() {
@@ -292,9 +296,10 @@ impl Bridge {
         tracing::info!(system_id = system, fallback = self.identity.is_bootstrap(), "system id");
         self.router.set_own_system(system);
         self.channels.forget_held();
+        self.ranks.set_own_system(system);
         if let Some(before) = before {
             self.router.forget_system(before);
-            let around = surroundings(&self.vehicle, self.autopilot);
+            let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
             for gimbal in self.roster.iter_mut() {
                 gimbal.manager.forget_system(now, before, around);
             }
@@ -398,7 +403,7 @@ impl Bridge {
     }
 
     fn shut_down(&mut self, now: Timestamp) {
-        let around = surroundings(&self.vehicle, self.autopilot);
+        let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
         for gimbal in self.roster.iter_mut() {
             gimbal.manager.handle_shutdown(now, around);
         }
@@ -433,7 +438,7 @@ impl Bridge {
                         self.send(now, channels, component, &message);
                     }
                     GimbalOutput::Driver(DriverOutput::Report(report)) => {
-                        let around = surroundings(&self.vehicle, self.autopilot);
+                        let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
                         self.roster.get_mut(at).manager.handle_report(now, report, around);
                     }
                     GimbalOutput::Manager(output) => self.carry_out_for_manager(now, at, component, output),
@@ -509,6 +514,6 @@ impl Bridge {
     }
 }
 
-fn surroundings(vehicle: &Vehicle, autopilot: Option<MavId>) -> Surroundings<'_> {
-    Surroundings { vehicle, autopilot, overheard: false, other_vehicle: false }
+fn surroundings<'a>(vehicle: &'a Vehicle, autopilot: Option<MavId>, ranks: &'a Ranks) -> Surroundings<'a> {
+    Surroundings { vehicle, autopilot, ranks, overheard: false, other_vehicle: false }
 }

@@ -7,6 +7,7 @@ pub mod control;
 pub mod intervals;
 mod manual;
 pub mod messages;
+pub mod rank;
 pub mod request;
 pub mod settings;
 pub mod tracking;
@@ -27,9 +28,10 @@ use crate::vehicle::Vehicle;
 use crate::wire::MavId;
 use crate::wire::dialect::MavMessage;
 use crate::wire::ids::{CommandResult, FailureFlags, GimbalFlags};
-use control::{Control, PRIMARY_SILENCE, Policy};
+use control::{Change, Control, PRIMARY_SILENCE, Place, Policy};
 use intervals::{DEFAULT_STATUS_INTERVAL, Schedule};
 use messages::Interval;
+use rank::Ranks;
 use request::{Demand, DemandKind, Refusal, Request};
 use settings::ControlSettings;
 use tracking::{RateTimeouts, Situation, Tracking};
@@ -53,6 +55,7 @@ pub struct Surroundings<'a> {
     pub vehicle: &'a Vehicle,
     /// The autopilot of our system, once it was heard.
     pub autopilot: Option<MavId>,
+    pub ranks: &'a Ranks,
     /// Whether a request of another component reached us by listening in: it is never answered.
     pub overheard: bool,
     /// Whether the sender belongs to another vehicle, which never has a say.
@@ -165,6 +168,8 @@ impl GimbalManager {
 
     /// A request addressed to this manager, or to everybody.
     pub fn handle_request(&mut self, now: Timestamp, sender: Sender, request: &Request, around: Surroundings<'_>) {
+        // A place whose lease ran out is free from that moment on, not only when the timer came round to it.
+        self.end_leases(now);
         match request {
             Request::Demand { gimbal, demand } => {
                 if *gimbal != 0 && Some(*gimbal) != self.device_id() {
@@ -242,11 +247,7 @@ impl GimbalManager {
     }
 
     pub fn handle_timeout(&mut self, now: Timestamp, around: Surroundings<'_>) {
-        let before = self.holders();
-        if self.control.handle_timeout(now, self.rules.lease_timeout) {
-            tracing::info!(gimbal = self.settings.name, "control lapsed: its holder is silent");
-            self.after_change_of_control(now, before);
-        }
+        self.end_leases(now);
         if self.source_lost_at().is_some_and(|at| at <= now) {
             tracing::info!(gimbal = self.settings.name, "rotation stopped: who asked for it is silent");
             self.tracking.stop_rates(now);
@@ -288,10 +289,8 @@ impl GimbalManager {
 
     /// The autopilot's system id has changed: places held under the old one are void.
     pub fn forget_system(&mut self, now: Timestamp, system: u8, around: Surroundings<'_>) {
-        let before = self.holders();
-        if self.control.forget_system(system) {
-            self.after_change_of_control(now, before);
-        }
+        let changes = self.control.forget_system(now, system);
+        self.after_changes_of_control(now, &changes);
         if self.tracking.source().is_some_and(|source| source.system == system) {
             self.tracking.stop_rates(now);
         }
@@ -357,11 +356,13 @@ impl GimbalManager {
         }
     }
 
-    fn policy(&self, around: Surroundings<'_>) -> Policy {
+    fn policy<'a>(&self, around: Surroundings<'a>) -> Policy<'a> {
         Policy {
             open_when_unclaimed: self.rules.open_when_unclaimed,
             takeover: self.settings.takeover,
-            release_quirk_of: around.autopilot.filter(|_| self.rules.px4_release_quirk),
+            px4_release_quirk: self.rules.px4_release_quirk,
+            autopilot: around.autopilot,
+            ranks: around.ranks,
         }
     }
 
@@ -449,21 +450,33 @@ impl GimbalManager {
         }
     }
 
-    /// Who holds primary and secondary control.
-    fn holders(&self) -> [Option<MavId>; 2] {
-        [self.control.primary(), self.control.secondary()]
+    /// The places of holders that are silent for the lease are free.
+    fn end_leases(&mut self, now: Timestamp) {
+        let changes = self.control.handle_timeout(now, self.rules.lease_timeout);
+        self.after_changes_of_control(now, &changes);
     }
 
-    /// Rates end with the control of who asked for them, and with every change of the primary.
-    fn after_change_of_control(&mut self, now: Timestamp, before: [Option<MavId>; 2]) {
-        let after = self.holders();
+    /// Rates end with the control of who asked for them, and with every change of the primary; the angle stays. Each
+    /// change is told at once.
+    fn after_changes_of_control(&mut self, now: Timestamp, changes: &[Change]) {
+        if changes.is_empty() {
+            return;
+        }
+        let holders = [self.control.primary(), self.control.secondary()];
         let source = self.tracking.source();
-        let source_lost_its_place = source.is_some() && before.contains(&source) && !after.contains(&source);
-        if after[0] != before[0] {
+        let source_lost_its_place =
+            source.is_some() && !holders.contains(&source) && changes.iter().any(|change| change.from == source);
+        let primary_changed = changes.iter().any(|change| change.place == Place::Primary);
+        if primary_changed {
             self.primary_demand = None;
         }
-        if after[0] != before[0] || source_lost_its_place {
+        if primary_changed || source_lost_its_place {
             self.tracking.stop_rates(now);
+        }
+        for Change { place, how, who, from, to } in changes {
+            let name = |id: &Option<MavId>| id.map_or_else(|| "nobody".to_owned(), |id| id.to_string());
+            let (from, to) = (name(from), name(to));
+            tracing::info!(gimbal = self.settings.name, ?place, ?how, %who, from, to, "control changed");
         }
         self.broadcast_status(now);
     }

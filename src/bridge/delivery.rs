@@ -66,6 +66,7 @@ impl Bridge {
     fn handle_heartbeat(&mut self, now: Timestamp, role: Role, frame: &Frame<'_>) {
         let source = frame.source();
         let Some(heartbeat) = frame.decode::<HEARTBEAT_DATA>() else { return };
+        self.ranks.handle_heartbeat(now, source, heartbeat.mavtype);
         // "HEARTBEAT.autopilot other than INVALID" is an autopilot; but old gimbals send GENERIC there.
         let is_autopilot =
             heartbeat.autopilot != mav_autopilot::INVALID && !mav_type::NOT_A_VEHICLE.contains(&heartbeat.mavtype);
@@ -88,7 +89,7 @@ impl Bridge {
             }
             if !was_known {
                 // D5: what it had taken before it was known as another vehicle is void.
-                let around = surroundings(&self.vehicle, self.autopilot);
+                let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
                 for gimbal in self.roster.iter_mut() {
                     gimbal.manager.forget_system(now, source.system, around);
                 }
@@ -169,7 +170,8 @@ impl Bridge {
         let Some(request) = read_request(frame) else { return };
         let sender = Sender { id: frame.source(), channel: from };
         let other_vehicle = self.is_other_vehicle(now, sender.id);
-        let around = Surroundings { vehicle: &self.vehicle, autopilot: self.autopilot, overheard, other_vehicle };
+        let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
+        let around = Surroundings { overheard, other_vehicle, ..around };
         for gimbal in self.roster.iter_mut().filter(|gimbal| for_us(gimbal.component)) {
             match &request {
                 Ok(request) => gimbal.manager.handle_request(now, sender, request, around),

@@ -24,7 +24,12 @@ const ROLES: &[(&str, Role)] = &[
 ];
 const FAMILIES: &[(&str, Family)] =
     &[(Family::Auto.name(), Family::Auto), (Family::MavlinkV2.name(), Family::MavlinkV2)];
-const TAKEOVERS: &[(&str, Takeover)] = &[("open", Takeover::Open), ("ask", Takeover::Ask)];
+const TAKEOVERS: &[(&str, Takeover)] = &[
+    ("open", Takeover::Open),
+    ("ask", Takeover::Ask),
+    ("priority", Takeover::Priority),
+    ("exclusive", Takeover::Exclusive),
+];
 const YAW_FRAMES: &[(&str, DeviceYawFrame)] =
     &[("auto", DeviceYawFrame::Auto), ("vehicle", DeviceYawFrame::Vehicle), ("earth", DeviceYawFrame::Earth)];
 const UNCLAIMED: &[(&str, bool)] = &[("open", true), ("closed", false)];

@@ -53,13 +53,17 @@ impl Family {
     }
 }
 
-/// Who may take primary control from a holder that did not release it.
+/// Who may take control from a holder that did not release it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Takeover {
     /// Anybody; politeness is the client's business (Gimbal Protocol v2).
     Open,
-    /// Nobody until the holder releases.
+    /// Nobody until the holder releases; our autopilot may borrow.
     Ask,
+    /// Whoever ranks higher: ground stations, then our autopilot, then the rest of our system, then anybody else.
+    Priority,
+    /// Nobody until the holder releases, our autopilot neither.
+    Exclusive,
 }
 
 /// In which frame the device wants its yaw.

@@ -107,15 +107,9 @@ impl GimbalManager {
             return Err(Refusal::denied("other_vehicle"));
         }
         let configure = Configure::read(command)?;
-        let before = self.holders();
         let policy = self.policy(around);
-        self.control.configure(now, sender, configure, around.autopilot, policy)?;
-        let after = self.holders();
-        if after != before {
-            let [primary, secondary] = after.map(|id| id.map_or_else(|| "nobody".to_owned(), |id| id.to_string()));
-            tracing::info!(gimbal = self.settings.name, primary, secondary, by = %sender, "control changed");
-            self.after_change_of_control(now, before);
-        }
+        let changes = self.control.configure(now, sender, configure, policy)?;
+        self.after_changes_of_control(now, &changes);
         Ok(())
     }
 

@@ -1,11 +1,15 @@
 //! Who may steer a gimbal.
 //!
 //! Implements `MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE`. One component holds primary control, one may hold secondary
-//! control; demands from anyone else are refused. Keeps no timers: when control lapses is decided in
-//! [`super::GimbalManager`], which tells how long each holder has been silent.
+//! control; demands from anyone else are refused. What the autopilot takes from another is borrowed: that one gets it
+//! back. Keeps no timers: when control lapses is decided in [`super::GimbalManager`], which tells how long each holder
+//! has been silent.
+
+mod takeover;
 
 use std::time::Duration;
 
+use super::rank::Ranks;
 use super::request::{Claim, Configure, Refusal};
 use crate::gimbals::settings::Takeover;
 use crate::timestamp::Timestamp;
@@ -16,23 +20,69 @@ use crate::wire::MavId;
 pub struct Control {
     primary: Option<Holder>,
     secondary: Option<Holder>,
+    /// Who had primary control when the autopilot took it, and gets it back; only while the autopilot has it.
+    lender: Option<Holder>,
     /// The autopilot that gave control back with −2 lately, and when (`px4_release_quirk`).
     quirk_release: Option<(MavId, Timestamp)>,
 }
 
+/// Who has one of the places.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Holder {
-    id: MavId,
+pub struct Holder {
+    pub id: MavId,
+    pub since: Timestamp,
     heard: Timestamp,
 }
 
-/// The rules that the configuration chooses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Policy {
+/// The rules that the configuration chooses, and who is who.
+#[derive(Clone, Copy, Debug)]
+pub struct Policy<'a> {
     pub open_when_unclaimed: bool,
     pub takeover: Takeover,
-    /// (−2, −2) from this component, when it holds control, releases it.
-    pub release_quirk_of: Option<MavId>,
+    /// (−2, −2) from the autopilot, when it holds control, releases it.
+    pub px4_release_quirk: bool,
+    /// Our system's, which may clear what others hold, and whose take-over is a borrow.
+    pub autopilot: Option<MavId>,
+    pub ranks: &'a Ranks,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    Primary,
+    Secondary,
+}
+
+/// A place that changed hands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Change {
+    pub place: Place,
+    pub how: How,
+    /// Who brought it about; of a place that lapsed, who had it.
+    pub who: MavId,
+    pub from: Option<MavId>,
+    pub to: Option<MavId>,
+}
+
+/// How a place changed hands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum How {
+    /// It was free.
+    Taken,
+    /// Another had it and did not give it.
+    TakenOver,
+    /// The same by our autopilot, which is to give it back.
+    Borrowed,
+    /// The autopilot is done with it, or gone, and who had it before has it again.
+    Restored,
+    /// It was given to another by its holder, or while it was free.
+    Delegated,
+    Released,
+    /// The autopilot took it from its holder for nobody.
+    Cleared,
+    /// Its holder was silent for the lease.
+    Lapsed,
+    /// The holder's system is another vehicle's, or not ours any more.
+    SystemGone,
 }
 
 /// A repeat of a release by −2 within this time is not a new claim: the answer to the first was lost.
@@ -50,37 +100,39 @@ impl Control {
         self.secondary.map(|holder| holder.id)
     }
 
-    /// Applies a CONFIGURE; `own_autopilot` may clear what others hold.
+    /// Who has that place, and since when.
+    pub fn holder(&self, place: Place) -> Option<Holder> {
+        match place {
+            Place::Primary => self.primary,
+            Place::Secondary => self.secondary,
+        }
+    }
+
+    /// From whom the autopilot has borrowed primary control.
+    pub fn lender(&self) -> Option<MavId> {
+        self.lender.map(|holder| holder.id)
+    }
+
+    /// Applies a CONFIGURE, both places or none; which of them changed hands.
     pub fn configure(
         &mut self,
         now: Timestamp,
         sender: MavId,
         configure: Configure,
-        own_autopilot: Option<MavId>,
-        policy: Policy,
-    ) -> Result<(), Refusal> {
-        let privileged = own_autopilot == Some(sender);
-        let quirk = policy.release_quirk_of == Some(sender);
-        let mut claim = configure.primary;
-        let mut release = self.quirk_release.filter(|(_, at)| now.since(*at) < QUIRK_MEMORY);
-        if claim == Claim::Take && quirk {
-            if self.primary() == Some(sender) {
-                claim = Claim::Release;
-                release = Some((sender, now));
-            } else if release.is_some_and(|(id, _)| id == sender) {
-                claim = Claim::Keep;
-            }
-        }
-        let primary = settle(self.primary, now, sender, claim, privileged, policy.takeover)?;
-        let secondary = settle(self.secondary, now, sender, configure.secondary, privileged, policy.takeover)?;
-        self.primary = primary;
-        self.secondary = secondary;
-        self.quirk_release = release;
-        Ok(())
+        policy: Policy<'_>,
+    ) -> Result<Vec<Change>, Refusal> {
+        let mut after = self.clone();
+        let primary = after.read_quirk(now, sender, configure.primary, policy);
+        let changes = [
+            after.settle(now, Place::Primary, sender, primary, policy)?,
+            after.settle(now, Place::Secondary, sender, configure.secondary, policy)?,
+        ];
+        *self = after;
+        Ok(changes.into_iter().flatten().collect())
     }
 
     /// Whether `sender` may make a demand on the gimbal. `primary_silent` tells that the primary has made none lately.
-    pub fn gate(&self, sender: MavId, primary_silent: bool, policy: Policy) -> Result<(), Refusal> {
+    pub fn gate(&self, sender: MavId, primary_silent: bool, policy: Policy<'_>) -> Result<(), Refusal> {
         match (self.primary(), self.secondary()) {
             (Some(primary), _) if primary == sender => Ok(()),
             (Some(_), Some(secondary)) if secondary == sender => {
@@ -99,7 +151,7 @@ impl Control {
 
     /// Something was heard from `id`.
     pub fn handle_heard(&mut self, now: Timestamp, id: MavId) {
-        for holder in [&mut self.primary, &mut self.secondary].into_iter().flatten() {
+        for holder in [&mut self.primary, &mut self.secondary, &mut self.lender].into_iter().flatten() {
             if holder.id == id {
                 holder.heard = now;
             }
@@ -108,160 +160,122 @@ impl Control {
 
     /// When the next lease runs out.
     pub fn poll_timeout(&self, lease: Duration) -> Option<Timestamp> {
-        [self.primary, self.secondary].into_iter().flatten().map(|holder| holder.heard + lease).min()
+        [self.primary, self.secondary, self.lender].into_iter().flatten().map(|holder| holder.heard + lease).min()
     }
 
-    /// Clears the places of holders silent for `lease`; true when any was.
-    pub fn handle_timeout(&mut self, now: Timestamp, lease: Duration) -> bool {
-        let mut changed = false;
-        for place in [&mut self.primary, &mut self.secondary] {
-            if place.is_some_and(|holder| now.since(holder.heard) >= lease) {
-                *place = None;
-                changed = true;
+    /// Clears the places of holders silent for `lease`.
+    pub fn handle_timeout(&mut self, now: Timestamp, lease: Duration) -> Vec<Change> {
+        self.clear_where(now, How::Lapsed, |holder| now.since(holder.heard) >= lease)
+    }
+
+    /// Takes every place from components of `system`.
+    pub fn forget_system(&mut self, now: Timestamp, system: u8) -> Vec<Change> {
+        self.clear_where(now, How::SystemGone, |holder| holder.id.system == system)
+    }
+
+    /// What the autopilot means by (−2, −2) under `px4_release_quirk`.
+    fn read_quirk(&mut self, now: Timestamp, sender: MavId, claim: Claim, policy: Policy<'_>) -> Claim {
+        self.quirk_release = self.quirk_release.filter(|(_, at)| now.since(*at) < QUIRK_MEMORY);
+        if claim != Claim::Take || !policy.px4_release_quirk || policy.autopilot != Some(sender) {
+            return claim;
+        }
+        if self.primary() == Some(sender) {
+            self.quirk_release = Some((sender, now));
+            Claim::Release
+        } else if self.quirk_release.is_some_and(|(id, _)| id == sender) {
+            Claim::Keep
+        } else {
+            claim
+        }
+    }
+
+    /// Does with one place what `sender` claims, if it may.
+    fn settle(
+        &mut self,
+        now: Timestamp,
+        place: Place,
+        sender: MavId,
+        claim: Claim,
+        policy: Policy<'_>,
+    ) -> Result<Option<Change>, Refusal> {
+        let held = self.holder(place);
+        let from = held.map(|holder| holder.id);
+        let is_autopilot = policy.autopilot == Some(sender);
+        let lent = (place == Place::Primary).then_some(self.lender).flatten();
+        let mut to = match claim {
+            Claim::Keep => return Ok(None),
+            Claim::Release if from != Some(sender) => {
+                if lent.is_some_and(|lender| lender.id == sender) {
+                    // It does not want back what it lent.
+                    self.lender = None;
+                }
+                return Ok(None);
+            }
+            Claim::Release | Claim::Clear => None,
+            Claim::Take => Some(sender),
+            Claim::Assign(id) => Some(id),
+        };
+        let borrows = place == Place::Primary && is_autopilot && to == Some(sender);
+        let is_of_another = from.is_some_and(|holder| holder != sender && Some(holder) != to);
+        if let Some(holder) = from.filter(|_| is_of_another) {
+            if to.is_none() && !is_autopilot {
+                return Err(Refusal::denied("not_in_control"));
+            }
+            let takes_back = to == Some(sender) && lent.is_some_and(|lender| lender.id == sender);
+            let rank = |id| policy.ranks.of(id, policy.autopilot);
+            let attempt = takeover::Attempt { taker: rank(sender), holder: rank(holder), borrows, takes_back };
+            takeover::check(policy.takeover, attempt)?;
+        }
+        let restored = lent.filter(|_| to.is_none());
+        to = to.or(restored.map(|lender| lender.id));
+        if to == from {
+            // Naming a holder again does not make it heard, unless it names itself.
+            if to == Some(sender) {
+                self.handle_heard(now, sender);
+            }
+            return Ok(None);
+        }
+        let how = match to {
+            None if is_of_another => How::Cleared,
+            None => How::Released,
+            Some(_) if restored.is_some() => How::Restored,
+            Some(_) if is_of_another && borrows => How::Borrowed,
+            Some(_) if is_of_another => How::TakenOver,
+            Some(id) if id == sender => How::Taken,
+            Some(_) => How::Delegated,
+        };
+        if place == Place::Primary {
+            self.lender = held.filter(|_| how == How::Borrowed);
+        }
+        let heard = restored.map_or(now, |lender| lender.heard);
+        *self.place_mut(place) = to.map(|id| Holder { id, since: now, heard });
+        Ok(Some(Change { place, how, who: sender, from, to }))
+    }
+
+    /// Takes their places from those of whom `is_gone` is true; what the autopilot had borrowed goes back.
+    fn clear_where(&mut self, now: Timestamp, how: How, is_gone: impl Fn(&Holder) -> bool) -> Vec<Change> {
+        let mut changes = Vec::new();
+        self.lender = self.lender.filter(|lender| !is_gone(lender));
+        for place in [Place::Primary, Place::Secondary] {
+            let Some(Holder { id, .. }) = self.holder(place).filter(&is_gone) else { continue };
+            *self.place_mut(place) = None;
+            changes.push(Change { place, how, who: id, from: Some(id), to: None });
+            let lender = if place == Place::Primary { self.lender.take() } else { None };
+            if let Some(lender) = lender {
+                self.primary = Some(Holder { since: now, ..lender });
+                changes.push(Change { place, how: How::Restored, who: id, from: None, to: Some(lender.id) });
             }
         }
-        changed
+        changes
     }
 
-    /// Takes every place from components of `system`; true when any was.
-    pub fn forget_system(&mut self, system: u8) -> bool {
-        let mut changed = false;
-        for place in [&mut self.primary, &mut self.secondary] {
-            if place.is_some_and(|holder| holder.id.system == system) {
-                *place = None;
-                changed = true;
-            }
+    fn place_mut(&mut self, place: Place) -> &mut Option<Holder> {
+        match place {
+            Place::Primary => &mut self.primary,
+            Place::Secondary => &mut self.secondary,
         }
-        changed
-    }
-}
-
-fn settle(
-    holder: Option<Holder>,
-    now: Timestamp,
-    sender: MavId,
-    claim: Claim,
-    privileged: bool,
-    takeover: Takeover,
-) -> Result<Option<Holder>, Refusal> {
-    let held_by_sender = holder.is_some_and(|holder| holder.id == sender);
-    let give = |id: MavId| {
-        let held_by_other = holder.is_some_and(|holder| holder.id != sender && holder.id != id);
-        if held_by_other && takeover == Takeover::Ask {
-            return Err(Refusal::denied("holder_must_release"));
-        }
-        // Naming a holder again does not make it heard, unless it names itself.
-        let heard = holder.filter(|holder| holder.id == id && id != sender).map_or(now, |holder| holder.heard);
-        Ok(Some(Holder { id, heard }))
-    };
-    match claim {
-        Claim::Keep => Ok(holder),
-        Claim::Take => give(sender),
-        Claim::Assign(id) => give(id),
-        Claim::Release if held_by_sender => Ok(None),
-        Claim::Release => Ok(holder),
-        Claim::Clear if holder.is_none() || held_by_sender || privileged => Ok(None),
-        Claim::Clear => Err(Refusal::denied("not_in_control")),
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const GCS: MavId = MavId::new(255, 190);
-    const COMPANION: MavId = MavId::new(1, 192);
-    const AUTOPILOT: MavId = MavId::new(1, 1);
-
-    /// `MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE`: "0: no one in control, -1: leave unchanged, -2: set itself in control,
-    /// -3: remove control if currently in control".
-    #[test]
-    #[rustfmt::skip]
-    fn configure_decides_who_holds_primary_control() {
-        for (holder,          sender,    claim,                     expected) in [
-            (None,            GCS,       Claim::Assign(GCS),        Ok(Some(GCS))),
-            (Some(GCS),       COMPANION, Claim::Keep,               Ok(Some(GCS))),
-            (None,            COMPANION, Claim::Take,               Ok(Some(COMPANION))),
-            (Some(GCS),       COMPANION, Claim::Release,            Ok(Some(GCS))),
-            (Some(GCS),       GCS,       Claim::Release,            Ok(None)),
-            (Some(GCS),       COMPANION, Claim::Assign(COMPANION),  Ok(Some(COMPANION))),
-            (Some(GCS),       GCS,       Claim::Assign(COMPANION),  Ok(Some(COMPANION))),
-            (Some(GCS),       GCS,       Claim::Clear,              Ok(None)),
-            (Some(GCS),       AUTOPILOT, Claim::Clear,              Ok(None)),
-            (Some(GCS),       COMPANION, Claim::Clear,              Err("not_in_control")),
-        ] {
-            let mut control = held_by(holder);
-            let configure = Configure { primary: claim, secondary: Claim::Keep };
-
-            let result = control.configure(Timestamp::ZERO, sender, configure, Some(AUTOPILOT), OPEN);
-
-            let outcome = result.map(|()| control.primary()).map_err(|refusal| refusal.reason);
-            assert_eq!(outcome, expected, "{sender} sent {claim:?}, held by {holder:?}");
-            if outcome.is_err() {
-                assert_eq!(control.primary(), holder, "a refused request changes nothing");
-            }
-        }
-    }
-
-    /// D24, `takeover = "ask"`: "another's CONFIGURE is DENIED … until the holder releases".
-    #[test]
-    fn a_holder_who_must_be_asked_keeps_control_until_it_lets_go() {
-        let ask = Policy { takeover: Takeover::Ask, ..OPEN };
-        let take = Configure { primary: Claim::Take, secondary: Claim::Keep };
-        let mut control = held_by(Some(GCS));
-
-        let refused = control.configure(Timestamp::ZERO, COMPANION, take, None, ask);
-        assert_eq!((refused, control.primary()), (Err(Refusal::denied("holder_must_release")), Some(GCS)));
-
-        let release = Configure { primary: Claim::Release, secondary: Claim::Keep };
-        assert_eq!(control.configure(Timestamp::ZERO, GCS, release, None, ask), Ok(()));
-        assert_eq!(control.configure(Timestamp::ZERO, COMPANION, take, None, ask), Ok(()));
-        assert_eq!(control.primary(), Some(COMPANION));
-    }
-
-    /// Protocol checklist 63: with the quirk on, (−2, −2) from the autopilot that holds control is a release, and its
-    /// repeat half a second later is not a new claim.
-    #[test]
-    fn the_px4_quirk_makes_minus_two_a_release_once() {
-        let quirk = Policy { release_quirk_of: Some(AUTOPILOT), ..OPEN };
-        let take = Configure { primary: Claim::Take, secondary: Claim::Keep };
-        let mut control = held_by(Some(AUTOPILOT));
-        for (millis, expected) in [(0, None), (500, None), (6_000, Some(AUTOPILOT))] {
-            let result = control.configure(Timestamp::from_millis(millis), AUTOPILOT, take, Some(AUTOPILOT), quirk);
-            assert_eq!((result, control.primary()), (Ok(()), expected), "at {millis} ms");
-        }
-    }
-
-    #[test]
-    #[rustfmt::skip]
-    fn the_gate_opens_to_who_is_in_control() {
-        let closed = Policy { open_when_unclaimed: false, ..OPEN };
-        for (primary,    sender,    policy, expected) in [
-            (None,       GCS,       OPEN,   Ok(())),
-            (None,       GCS,       closed, Err(Refusal::denied("nobody_in_control"))),
-            (Some(GCS),  GCS,       closed, Ok(())),
-            (Some(GCS),  COMPANION, OPEN,   Err(Refusal::denied("not_in_control"))),
-        ] {
-            assert_eq!(held_by(primary).gate(sender, false, policy), expected);
-        }
-    }
-
-    /// D6: the slot of a holder not heard for the lease is cleared.
-    #[test]
-    fn a_silent_holder_loses_control() {
-        let lease = Duration::from_secs(10);
-        let mut control = held_by(Some(GCS));
-        control.handle_heard(Timestamp::from_secs(5), GCS);
-        assert_eq!(control.poll_timeout(lease), Some(Timestamp::from_secs(15)));
-        assert!(!control.handle_timeout(Timestamp::from_micros(14_999_999), lease));
-        assert!(control.handle_timeout(Timestamp::from_secs(15), lease));
-        assert_eq!(control.primary(), None);
-    }
-
-    const OPEN: Policy = Policy { open_when_unclaimed: true, takeover: Takeover::Open, release_quirk_of: None };
-
-    fn held_by(holder: Option<MavId>) -> Control {
-        let primary = holder.map(|id| Holder { id, heard: Timestamp::ZERO });
-        Control { primary, ..Control::default() }
-    }
-}
+mod tests;

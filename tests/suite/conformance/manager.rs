@@ -3,6 +3,7 @@
 mod bad_days;
 mod commands;
 mod control;
+mod control_takeover;
 mod frames;
 mod setpoints;
 mod status;
