@@ -9,6 +9,7 @@ mod delivery;
 mod heartbeat;
 mod identity;
 mod outbox;
+mod own_commands;
 pub mod pacing;
 mod picture;
 mod rates;
@@ -17,19 +18,19 @@ mod sent;
 pub mod settings;
 pub mod snapshot;
 mod streams;
+mod transactions;
 
 pub use crate::channel::{ChannelId, ChannelSet};
 use crate::gimbals::DriverOutput;
-use crate::gimbals::mavlink_v2::packet;
 use crate::manager::rank::Ranks;
 use crate::manager::{ManagerOutput, Surroundings, messages};
 use crate::router::Router;
 use crate::timers::TimerTable;
 use crate::timestamp::Timestamp;
 use crate::vehicle::Vehicle;
-use crate::wire::dialect::{COMMAND_ACK_DATA, MavMessage};
-use crate::wire::ids::{command, component, mav_state, message};
-use crate::wire::{DatagramFrames, Frame, FrameBuffer, MavId, StreamDecoder, Target};
+use crate::wire::dialect::MavMessage;
+use crate::wire::ids::{component, mav_state};
+use crate::wire::{DatagramFrames, FrameBuffer, MavId, StreamDecoder};
 use channels::Channels;
 use conflicts::{Conflict, Conflicts};
 use identity::Identity;
@@ -37,6 +38,7 @@ use outbox::Outbox;
 use roster::{GimbalOutput, Roster};
 use settings::{FALLBACK_SYSTEM_ID, Role, Settings};
 use streams::AutopilotStreams;
+use transactions::{Asker, Order, Transactions};
 
 /// Position of a link in [`settings::Settings::links`].
 pub type LinkIndex = usize;
@@ -101,6 +103,7 @@ pub struct Bridge {
     ranks: Ranks,
     roster: Roster,
     streams: AutopilotStreams,
+    transactions: Transactions,
     conflicts: Conflicts,
     outbox: Outbox,
     buffer: FrameBuffer,
@@ -127,6 +130,7 @@ impl Bridge {
             ranks: Ranks::default(),
             roster: Roster::new(&settings),
             streams: AutopilotStreams::default(),
+            transactions: Transactions::default(),
             conflicts: Conflicts::default(),
             outbox: Outbox::default(),
             buffer: FrameBuffer::default(),
@@ -186,6 +190,7 @@ impl Bridge {
                 Timer::Heartbeat => self.handle_heartbeat_timer(now),
             }
         }
+        self.transactions.handle_timeout(now);
         self.ask_autopilot(now);
         for at in 0..self.roster.len() {
             let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
@@ -214,7 +219,8 @@ impl Bridge {
             self.timers.next().map(|(at, _)| at),
             self.identity.poll_timeout(),
             self.channels.poll_timeout(),
-            self.streams.poll_timeout().filter(|_| self.identity.system().is_some()),
+            self.streams.poll_timeout().filter(|_| self.may_ask_autopilot()),
+            self.transactions.poll_timeout(),
         ];
         let gimbals = self.roster.iter().filter_map(|gimbal| gimbal.poll_timeout());
         let gimbals = gimbals.filter(|_| self.identity.system().is_some());
@@ -306,6 +312,7 @@ impl Bridge {
         }
         self.autopilot = None;
         self.vehicle = Vehicle::new();
+        self.transactions.clear();
         if let Some(system) = system
             && let Some((component, _)) = self.vehicles[usize::from(system)]
         {
@@ -364,44 +371,6 @@ impl Bridge {
         }
     }
 
-    /// Which messages of the autopilot are wanted at present.
-    fn look_after_streams(&mut self, now: Timestamp) {
-        match (self.autopilot.is_some() && self.vehicle.alive(now), self.streams.has_autopilot()) {
-            (true, false) => self.streams.handle_autopilot_found(now),
-            (false, true) => self.streams.handle_autopilot_lost(),
-            _ => {}
-        }
-        let has_gimbal_of_ours = self.roster.iter().filter_map(|gimbal| gimbal.manager.device()).any(|device| {
-            let channels = self.channels_of_device(device);
-            !channels.is_empty() && channels.intersection(self.channels.with_role(Role::Autopilot)).is_empty()
-        });
-        self.streams.set_needed(message::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE, has_gimbal_of_ours);
-        self.streams.set_needed(message::GLOBAL_POSITION_INT, true);
-        self.streams.set_needed(message::ATTITUDE, self.vehicle.heading(now).is_none());
-    }
-
-    fn ask_autopilot(&mut self, now: Timestamp) {
-        let (Some(system), Some(autopilot)) = (self.identity.system(), self.autopilot) else { return };
-        let Some((message_id, interval)) = self.streams.take_due(now) else { return };
-        let target = Target::Component(autopilot);
-        let request = packet::set_message_interval(target, message_id, interval);
-        let channels = self.router.route_own(now, target);
-        let component = self.roster.get_mut(0).component;
-        self.send_as(now, system, channels, component, &request);
-    }
-
-    /// The autopilot's answer to what we asked of it.
-    fn note_answer(&mut self, frame: &Frame<'_>) {
-        let Some(ack) = frame.decode::<COMMAND_ACK_DATA>() else { return };
-        let target = frame.target();
-        let to_us = target == Target::Everyone
-            || matches!(target, Target::Component(id) if self.is_own_id(id))
-            || target == Target::System(self.identity.system().unwrap_or(0));
-        if ack.command == command::SET_MESSAGE_INTERVAL && to_us {
-            self.streams.handle_answer(ack.result);
-        }
-    }
-
     fn shut_down(&mut self, now: Timestamp) {
         let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
         for gimbal in self.roster.iter_mut() {
@@ -423,11 +392,16 @@ impl Bridge {
         self.shutting_down = true;
     }
 
-    /// Does what the gimbals' drivers and managers want done.
+    /// Does what the gimbals' drivers and managers want done, and what is to be done about our own commands.
     fn carry_out(&mut self, now: Timestamp) {
         if self.identity.system().is_none() {
             return;
         }
+        self.carry_out_for_gimbals(now);
+        self.carry_out_own_commands(now);
+    }
+
+    fn carry_out_for_gimbals(&mut self, now: Timestamp) {
         for at in 0..self.roster.len() {
             while let Some(output) = self.roster.get_mut(at).poll_output() {
                 let component = self.roster.get_mut(at).component;
@@ -436,6 +410,10 @@ impl Bridge {
                         let device = self.roster.get_mut(at).manager.device();
                         let channels = device.map_or(ChannelSet::EMPTY, |device| self.channels_of_device(device));
                         self.send(now, channels, component, &message);
+                    }
+                    GimbalOutput::Driver(DriverOutput::Command(command)) => {
+                        let order = Order { asker: Asker::Driver, manager: component, command: *command };
+                        self.transactions.send(now, order);
                     }
                     GimbalOutput::Driver(DriverOutput::Report(report)) => {
                         let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);

@@ -8,4 +8,4 @@ pub mod report;
 pub mod setpoint;
 pub mod settings;
 
-pub use driver::{DriverOutput, GimbalDriver};
+pub use driver::{CommandOutcome, DriverOutput, GimbalDriver};

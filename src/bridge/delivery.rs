@@ -46,6 +46,7 @@ impl Bridge {
                     self.router.note_boot_time(now, from, source, time.time_boot_ms);
                 }
             }
+            message::COMMAND_ACK if !ours => self.handle_command_ack(now, frame),
             _ => {}
         }
         for gimbal in self.roster.iter_mut() {
@@ -54,7 +55,6 @@ impl Bridge {
         if self.autopilot == Some(source) {
             self.vehicle.handle_frame(now, frame);
             self.streams.handle_seen(now, frame.message_id());
-            self.note_answer(frame);
         }
         if !ours {
             self.handle_device(now, from, link, role, frame);

@@ -142,6 +142,11 @@ impl Roster {
         self.gimbals.iter_mut().find(|gimbal| gimbal.adopted == Some(device))
     }
 
+    /// The gimbal whose manager that component of ours is.
+    pub fn of_manager(&mut self, component: u8) -> Option<&mut Gimbal> {
+        self.gimbals.iter_mut().find(|gimbal| gimbal.component == component)
+    }
+
     /// The channel of a managed device.
     pub fn channel_of(&self, device: MavId) -> Option<ChannelId> {
         self.gimbals.iter().find(|gimbal| gimbal.adopted == Some(device))?.channel

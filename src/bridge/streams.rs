@@ -4,6 +4,7 @@
 
 use std::time::Duration;
 
+use crate::gimbals::CommandOutcome;
 use crate::timestamp::Timestamp;
 use crate::wire::ids::{CommandResult, message};
 
@@ -12,9 +13,6 @@ const MISSING_AFTER: Duration = Duration::from_secs(2);
 
 /// It is asked for at most so often.
 const ASK_EVERY: Duration = Duration::from_secs(5);
-
-/// Between two requests, so that the answer tells which one it is for.
-const SPACING: Duration = Duration::from_millis(500);
 
 /// A message we want, and how often.
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +30,6 @@ struct Wanted {
 pub struct AutopilotStreams {
     wanted: [Wanted; 3],
     since: Option<Timestamp>,
-    last_request: Option<Timestamp>,
 }
 
 impl Default for AutopilotStreams {
@@ -52,7 +49,6 @@ impl Default for AutopilotStreams {
                 wanted(message::GLOBAL_POSITION_INT, 200),
             ],
             since: None,
-            last_request: None,
         }
     }
 }
@@ -91,12 +87,12 @@ impl AutopilotStreams {
         }
     }
 
-    /// The autopilot's answer to our latest request.
-    pub fn handle_answer(&mut self, result: u8) {
-        let refusals = [CommandResult::Denied as u8, CommandResult::Unsupported as u8, CommandResult::Failed as u8];
-        let latest = self.wanted.iter_mut().filter(|wanted| wanted.asked.is_some()).max_by_key(|wanted| wanted.asked);
-        if let Some(wanted) = latest
-            && refusals.contains(&result)
+    /// What became of our request for `message_id`.
+    pub fn handle_outcome(&mut self, message_id: u32, outcome: CommandOutcome) {
+        const REFUSALS: [u8; 3] =
+            [CommandResult::Denied as u8, CommandResult::Unsupported as u8, CommandResult::Failed as u8];
+        if let Some(wanted) = self.find(message_id)
+            && matches!(outcome, CommandOutcome::Answered(result) if REFUSALS.contains(&result))
         {
             wanted.refused = true;
         }
@@ -105,24 +101,16 @@ impl AutopilotStreams {
     pub fn poll_timeout(&self) -> Option<Timestamp> {
         let since = self.since?;
         let due = self.wanted.iter().filter(|wanted| wanted.needed && !wanted.refused).map(|wanted| wanted.due(since));
-        Some(self.spaced(due.min()?))
+        due.min()
     }
 
-    /// A message to ask for at `now`, with its interval; at most one at a time, so that its answer can be told.
+    /// A message to ask for at `now`, with its interval; the next one when this request is done with.
     pub fn take_due(&mut self, now: Timestamp) -> Option<(u32, Duration)> {
         let since = self.since?;
-        if self.spaced(now) > now {
-            return None;
-        }
         let wanted =
             self.wanted.iter_mut().find(|wanted| wanted.needed && !wanted.refused && wanted.due(since) <= now)?;
         wanted.asked = Some(now);
-        self.last_request = Some(now);
         Some((wanted.message_id, wanted.interval))
-    }
-
-    fn spaced(&self, at: Timestamp) -> Timestamp {
-        self.last_request.map_or(at, |last| at.max(last + SPACING))
     }
 
     fn find(&mut self, message_id: u32) -> Option<&mut Wanted> {

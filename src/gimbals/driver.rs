@@ -3,7 +3,7 @@
 use super::report::Report;
 use super::setpoint::Setpoint;
 use crate::timestamp::Timestamp;
-use crate::wire::dialect::MavMessage;
+use crate::wire::dialect::{COMMAND_LONG_DATA, MavMessage};
 use crate::wire::{Frame, MavId};
 
 /// The conversation with one gimbal.
@@ -22,6 +22,9 @@ pub trait GimbalDriver: std::fmt::Debug {
     /// An order, in a yaw frame that the device accepts.
     fn handle_setpoint(&mut self, now: Timestamp, setpoint: Setpoint);
 
+    /// What became of a command that the driver gave out ([`DriverOutput::Command`]).
+    fn handle_command_outcome(&mut self, now: Timestamp, command: &COMMAND_LONG_DATA, outcome: CommandOutcome);
+
     fn handle_timeout(&mut self, now: Timestamp);
 
     fn poll_output(&mut self) -> Option<DriverOutput>;
@@ -34,5 +37,16 @@ pub trait GimbalDriver: std::fmt::Debug {
 pub enum DriverOutput {
     /// To be sent in the manager's name, on the device's link only.
     Message(Box<MavMessage>),
+    /// The same for a command to one component, which is sent again until it is answered.
+    Command(Box<COMMAND_LONG_DATA>),
     Report(Report),
+}
+
+/// What became of a command of ours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CommandOutcome {
+    /// `MAV_RESULT`, known to us or not.
+    Answered(u8),
+    /// It was sent as often as a command is sent.
+    Unanswered,
 }

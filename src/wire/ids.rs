@@ -110,6 +110,7 @@ pub enum CommandResult {
     Denied = 2,
     Unsupported = 3,
     Failed = 4,
+    InProgress = 5,
     UnsupportedMavFrame = 9,
 }
 

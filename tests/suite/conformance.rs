@@ -6,3 +6,4 @@ mod discovery;
 mod identity;
 mod manager;
 mod mavsdk_trace;
+mod own_commands;

@@ -8,13 +8,13 @@ use std::time::Duration;
 use super::packet::{self, DeviceStatus};
 use crate::geometry::Angle;
 use crate::gimbals::capabilities::Capabilities;
-use crate::gimbals::driver::{DriverOutput, GimbalDriver};
+use crate::gimbals::driver::{CommandOutcome, DriverOutput, GimbalDriver};
 use crate::gimbals::report::{GimbalStatus, Identity, Report};
 use crate::gimbals::setpoint::Setpoint;
 use crate::timers::TimerTable;
 use crate::timestamp::Timestamp;
-use crate::wire::dialect::MavMessage;
-use crate::wire::ids::{CapFlags, GimbalFlags, message};
+use crate::wire::dialect::{COMMAND_LONG_DATA, MavMessage};
+use crate::wire::ids::{CapFlags, GimbalFlags, command, message};
 use crate::wire::{Frame, MavId, Target};
 
 /// A device not heard for so long is lost.
@@ -37,8 +37,9 @@ const USABLE_WITHOUT_INFORMATION_AFTER: Duration = Duration::from_secs(5);
 const RATE_WINDOW: Duration = Duration::from_secs(5);
 /// … and should come at least so often …
 const LEAST_STATUS_RATE_HZ: u32 = 5;
-/// … or is asked for at this interval, once.
+/// … or is asked for at this interval, once; so often when there is no answer.
 const WANTED_STATUS_INTERVAL: Duration = Duration::from_millis(100);
+const RATE_REQUESTS: u8 = 3;
 
 /// A time since boot that jumps back further means that the device was restarted.
 const REBOOT_STEP_MS: u32 = 1_000;
@@ -54,9 +55,12 @@ pub struct MavlinkV2Driver {
     first_status: Option<Timestamp>,
     asking_since: Timestamp,
     requests: u32,
+    /// When it was or will be asked because it seemed to have been restarted.
+    asked_on_restart: Option<Timestamp>,
     boot_ms: Option<u32>,
     statuses_in_window: u32,
-    rate_asked: bool,
+    /// How often 285 may still be asked for.
+    rate_requests_left: u8,
     capabilities: Option<Capabilities>,
     /// It has set a frame bit, so it is newer than them.
     sets_frame_bits: bool,
@@ -92,7 +96,7 @@ impl MavlinkV2Driver {
         self.outputs.push_back(DriverOutput::Report(Report::Alive { device }));
         self.timers.set(Timer::CheckRate, now + RATE_WINDOW);
         self.statuses_in_window = 0;
-        self.rate_asked = false;
+        self.rate_requests_left = RATE_REQUESTS;
         self.ask_anew(now);
     }
 
@@ -108,9 +112,17 @@ impl MavlinkV2Driver {
         let before = self.boot_ms.replace(boot_ms);
         if before.is_some_and(|before| before.wrapping_sub(boot_ms) > REBOOT_STEP_MS && boot_ms < before) {
             self.fills_delta_yaw = false;
-            self.rate_asked = false;
+            self.rate_requests_left = RATE_REQUESTS;
             self.outputs.push_back(DriverOutput::Report(Report::Restarted));
             self.ask_anew(now);
+            // Two devices under one id seem to be restarted with every word they say.
+            let at = match self.asked_on_restart {
+                Some(ahead) if ahead > now => ahead,
+                Some(last) => now.max(last + ASK_EVERY),
+                None => now,
+            };
+            self.asked_on_restart = Some(at);
+            self.timers.set(Timer::AskInformation, at);
         }
     }
 
@@ -194,11 +206,11 @@ impl MavlinkV2Driver {
     fn check_rate(&mut self, now: Timestamp) {
         let Some(device) = self.device else { return };
         let enough = LEAST_STATUS_RATE_HZ * RATE_WINDOW.as_secs() as u32;
-        if self.statuses_in_window < enough && !self.rate_asked {
-            self.rate_asked = true;
-            let target = Target::Component(device);
+        if self.statuses_in_window < enough && self.rate_requests_left > 0 {
+            self.rate_requests_left -= 1;
             let wanted = message::GIMBAL_DEVICE_ATTITUDE_STATUS;
-            self.send(packet::set_message_interval(target, wanted, WANTED_STATUS_INTERVAL));
+            let command = packet::set_message_interval(device, wanted, WANTED_STATUS_INTERVAL);
+            self.outputs.push_back(DriverOutput::Command(Box::new(command)));
         }
         self.statuses_in_window = 0;
         self.timers.set(Timer::CheckRate, now + RATE_WINDOW);
@@ -250,6 +262,14 @@ impl GimbalDriver for MavlinkV2Driver {
             && self.alive
         {
             self.send(packet::set_attitude(device, &setpoint));
+        }
+    }
+
+    fn handle_command_outcome(&mut self, _now: Timestamp, command: &COMMAND_LONG_DATA, outcome: CommandOutcome) {
+        let ours = self.device == Some(MavId::new(command.target_system, command.target_component));
+        // Whatever the answer is, asking again would not change it.
+        if ours && command.command == command::SET_MESSAGE_INTERVAL && matches!(outcome, CommandOutcome::Answered(_)) {
+            self.rate_requests_left = 0;
         }
     }
 

@@ -146,16 +146,17 @@ pub fn set_attitude(device: MavId, setpoint: &Setpoint) -> MavMessage {
 
 /// `REQUEST_MESSAGE` for `message_id`.
 pub fn request_message(target: Target, message_id: u32) -> MavMessage {
-    command_long(target, command::REQUEST_MESSAGE, [message_id as f32, 0.0])
+    MavMessage::COMMAND_LONG(command_long(target, command::REQUEST_MESSAGE, [message_id as f32, 0.0]))
 }
 
 /// `SET_MESSAGE_INTERVAL` for `message_id`.
-pub fn set_message_interval(target: Target, message_id: u32, interval: Duration) -> MavMessage {
-    command_long(target, command::SET_MESSAGE_INTERVAL, [message_id as f32, interval.as_micros() as f32])
+pub fn set_message_interval(target: MavId, message_id: u32, interval: Duration) -> COMMAND_LONG_DATA {
+    let params = [message_id as f32, interval.as_micros() as f32];
+    command_long(Target::Component(target), command::SET_MESSAGE_INTERVAL, params)
 }
 
-fn command_long(target: Target, command: u16, [param1, param2]: [f32; 2]) -> MavMessage {
-    MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
+fn command_long(target: Target, command: u16, [param1, param2]: [f32; 2]) -> COMMAND_LONG_DATA {
+    COMMAND_LONG_DATA {
         param1,
         param2,
         param3: 0.0,
@@ -167,5 +168,5 @@ fn command_long(target: Target, command: u16, [param1, param2]: [f32; 2]) -> Mav
         target_system: target.system(),
         target_component: target.component(),
         confirmation: 0,
-    })
+    }
 }

@@ -40,18 +40,27 @@ fn item_139_the_state_for_gimbals_reaches_the_gimbal_as_it_is() {
     }
 }
 
-/// "When no 286 is seen for 2 s and the device wants it, 511(286, ≤ 40000) is sent to S/1, at most every 5 s."
+/// "When no 286 is seen for 2 s and the device wants it, 511(286, ≤ 40000) is sent to S/1, at most every 5 s." A request
+/// without an answer is sent three times, as every command of ours (132).
 #[test]
 fn item_140_a_missing_state_is_asked_for() {
     let (mut world, places) = World::empty(three_links());
     world.run_with(Duration::from_secs(30), &peers(places));
 
-    let asked = state_requests(&mut world, places.autopilot);
+    let sent = state_requests(&mut world, places.autopilot);
+    let asked: Vec<_> = sent.iter().filter(|(_, request)| request.confirmation == 0).collect();
 
     assert!(asked[0].0 >= Timestamp::from_secs(2) && asked[0].0 <= Timestamp::from_secs(3), "{asked:?}");
     assert!(asked.windows(2).all(|pair| pair[1].0 - pair[0].0 >= Duration::from_secs(5)), "{asked:?}");
     assert!(asked.len() >= 5, "it is asked for again: {asked:?}");
-    for (_, request) in &asked {
+    let tries = |(at, request): &(Timestamp, COMMAND_LONG_DATA)| {
+        [0, 1, 2].map(|confirmation| {
+            let half_seconds = Duration::from_millis(500) * u32::from(confirmation);
+            (*at + half_seconds, COMMAND_LONG_DATA { confirmation, ..request.clone() })
+        })
+    };
+    assert_eq!(sent, asked.iter().flat_map(|request| tries(request)).collect::<Vec<_>>());
+    for (_, request) in &sent {
         assert_eq!((request.target_system, request.target_component), (1, 1));
         assert!(request.param2 > 0.0 && request.param2 <= 40_000.0);
     }
@@ -94,7 +103,8 @@ fn item_140_a_state_that_comes_or_is_refused_or_not_wanted_is_not_asked_for() {
     world.run_with(Duration::from_secs(10), &[autopilot.clone(), gimbal.clone(), state]);
     assert_eq!(state_requests(&mut world, places.autopilot), [], "it comes");
     world.run_with(Duration::from_secs(4), &[autopilot.clone(), gimbal.clone()]);
-    assert_eq!(state_requests(&mut world, places.autopilot).len(), 1, "it has stopped");
+    let asked = state_requests(&mut world, places.autopilot);
+    assert_eq!(asked.iter().map(|(_, request)| request.confirmation).collect::<Vec<_>>(), [0, 1, 2], "it has stopped");
 
     let (mut world, places) = World::empty(three_links());
     world.run_with(Duration::from_secs(10), std::slice::from_ref(&autopilot));

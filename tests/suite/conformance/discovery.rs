@@ -250,6 +250,23 @@ fn item_35_a_restarted_gimbal_is_asked_anew() {
     }
 }
 
+/// Protocol checklist 26 and 35 again: two devices under one id, each with a clock of its own, look like one that is
+/// restarted with every message; it is still asked once a second.
+#[test]
+fn item_35_a_gimbal_that_seems_to_restart_all_the_time_is_asked_once_a_second() {
+    let (mut world, places) = with_device();
+    let status = |millis| {
+        let status = device_status(Timestamp::from_millis(millis), 44, 0.0, 0.0);
+        MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status)
+    };
+    let every = Duration::from_millis(200);
+    let both = [(every, places.gimbal, GIMBAL, status(90_000)), (every, places.gimbal, GIMBAL, status(30_000))];
+
+    world.run_with(Duration::from_millis(9_500), &both);
+
+    assert_eq!(information_requests(&world.take(places.gimbal)).len(), 10);
+}
+
 /// "When failure_flags has 256 (calibration), command 1000 is answered TEMPORARILY_REJECTED and CONFIGURE still
 /// ACCEPTED."
 #[test]
@@ -306,7 +323,7 @@ fn item_39_a_slow_gimbal_is_asked_to_speak_faster_once() {
         let (mut world, places) = with_device();
         let status = MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(device_status(world.now, 44, 0.0, 0.0));
         let every = Duration::from_millis(every_ms);
-        world.run_with(Duration::from_secs(6), &[(every, places.gimbal, GIMBAL, status.clone())]);
+        world.run_with(Duration::from_millis(5_400), &[(every, places.gimbal, GIMBAL, status.clone())]);
         let refusal = ack(MANAGER, 511, 2);
         world.send(places.gimbal, GIMBAL, &MavMessage::COMMAND_ACK(refusal));
         world.run_with(Duration::from_secs(20), &[(every, places.gimbal, GIMBAL, status)]);
