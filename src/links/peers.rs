@@ -193,6 +193,7 @@ mod tests {
     }
 
     /// "a peer silent for 60 s is closed".
+    /// Client checklist E133: "… the old one is dropped after its time."
     #[test]
     fn a_silent_peer_is_closed_after_a_minute() {
         let mut peers = Peers::new(None);

@@ -218,6 +218,7 @@ fn names_can_be_written_in_a_variable() {
     );
 }
 
+/// Client checklist E5: "Configuring M as 1, as 0 … is refused or warned at start."
 #[test]
 fn numbers_have_ranges_and_kinds() {
     for (line, problem) in [
@@ -227,6 +228,7 @@ fn numbers_have_ranges_and_kinds() {
         ("setpoint_rate_hz = \"20\"", "found \"20\"; expected a whole number from 5 to 50"),
         ("component_id = 6", "found 6; expected a whole number from 7 to 255"),
         ("component_id = 256", "found 256; expected a whole number from 7 to 255"),
+        ("manager_component_id = 0", "found 0; expected a whole number from 7 to 255"),
         ("manager_component_id = 1", "found 1; expected a whole number from 7 to 255"),
         ("component_id = 99999999999999999999", "found 99999999999999999999; expected a whole number from 7 to 255"),
         ("manual_yaw_rate_dps = 0", "found 0; expected a number of degrees per second from 0.1 to 720"),
@@ -268,6 +270,7 @@ fn numbers_have_ranges_and_kinds() {
 }
 
 /// "a fifth needs `manager_component_id`".
+/// Client checklist E5: "Configuring M … as 100–105 is refused", and as a device.
 #[test]
 fn managers_have_ids_of_their_own() {
     const EXPECTED: &str = "expected a component id from 7 to 255 that nobody else on the vehicle has, for example 195";

@@ -120,6 +120,8 @@ fn item_15_only_links_to_an_autopilot_are_believed() {
 
 /// "When running, HEARTBEAT (type 18, autopilot 8, base_mode 0, custom_mode 0, version 3) appears on every link at
 /// 1 Hz ± 10 %."
+/// Client checklist E4: "type 26, autopilot 8, base_mode 0, custom_mode 0, mavlink_version 3", where the type of a manager
+/// on a component of its own is 18.
 #[test]
 fn item_19_every_link_gets_one_heartbeat_a_second() {
     let (mut world, places) = World::empty(three_links());
@@ -284,6 +286,7 @@ fn item_24_sequence_numbers_have_no_gap_on_a_full_serial_line() {
 
 /// D1: "one component per gimbal, type ONBOARD_CONTROLLER (18) … 191 always beats, the others from when their gimbal is
 /// known. A request to 191 concerns its gimbal only; a request to component 0 concerns all."
+/// Client checklist E6: "Default M is one of 154, 171–175"; those are the devices here, and the managers 191 to 194.
 #[test]
 fn d1_each_gimbal_has_a_manager_component_of_its_own() {
     let mut settings = three_links();

@@ -1,12 +1,15 @@
 //! The gimbal manager as its clients see it (protocol checklist 8.4 to 8.7, 8.9, 8.14).
 
+mod answers;
 mod bad_days;
 mod commands;
 mod control;
 mod control_takeover;
 mod frames;
+mod presence;
 mod setpoints;
 mod status;
+mod streams;
 
 use std::time::Duration;
 

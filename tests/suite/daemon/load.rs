@@ -16,6 +16,7 @@ use crate::support::daemon::{Daemon, Heard, Line, Site, Station, link};
 use crate::support::world::{AUTOPILOT, GCS, MANAGER, heartbeat};
 
 /// "Two masters and a flood": what others say does not slow down what we owe.
+/// Client checklist E131: "5000 foreign messages/s on the link: heartbeat, 281, ACK limits … still hold."
 #[test]
 fn a_flood_does_not_change_the_pace() {
     const FLOOD_PER_MS: usize = 5;
