@@ -82,8 +82,10 @@ proptest! {
             check_what_was_said(&mut world, places)?;
         }
 
-        // Everybody falls silent but the gimbal, which takes its yaw as it did: in another frame a rotation would go on in
-        // angles.
+        // Everybody falls silent but the gimbal, which takes its yaw as it did last: in another frame a rotation goes on in
+        // angles, from the next setpoint on.
+        look_on(&mut world, places, flags, Duration::from_millis(100));
+        check_what_was_said(&mut world, places)?;
         let was_turning = is_turning(&world);
         let mut stopped = false;
         for _ in 0..120 {
