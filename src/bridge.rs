@@ -3,9 +3,12 @@
 //! **One input, then [`Bridge::poll_output`] until it is `None`, then the next input.** Time never goes backwards and
 //! only comes in as `now`.
 
+mod allowance;
+mod announcements;
 mod channels;
 mod conflicts;
 mod delivery;
+mod events;
 mod heartbeat;
 mod identity;
 mod outbox;
@@ -22,6 +25,7 @@ mod transactions;
 
 pub use crate::channel::{ChannelId, ChannelSet};
 use crate::gimbals::DriverOutput;
+use crate::manager::events::Event;
 use crate::manager::rank::Ranks;
 use crate::manager::{ManagerOutput, Surroundings, messages};
 use crate::router::Router;
@@ -31,11 +35,13 @@ use crate::vehicle::Vehicle;
 use crate::wire::dialect::MavMessage;
 use crate::wire::ids::{component, mav_state};
 use crate::wire::{DatagramFrames, FrameBuffer, MavId, StreamDecoder};
+use announcements::{Announcement, Announcements, Subject};
 use channels::Channels;
 use conflicts::{Conflict, Conflicts};
+use events::Events;
 use identity::Identity;
 use outbox::Outbox;
-use roster::{GimbalOutput, Roster};
+use roster::{Gimbal, GimbalOutput, Roster};
 use settings::{FALLBACK_SYSTEM_ID, Role, Settings};
 use streams::AutopilotStreams;
 use transactions::{Asker, Order, Transactions};
@@ -105,6 +111,8 @@ pub struct Bridge {
     streams: AutopilotStreams,
     transactions: Transactions,
     conflicts: Conflicts,
+    events: Events,
+    announcements: Announcements,
     outbox: Outbox,
     buffer: FrameBuffer,
     timers: TimerTable<Timer>,
@@ -132,6 +140,8 @@ impl Bridge {
             streams: AutopilotStreams::default(),
             transactions: Transactions::default(),
             conflicts: Conflicts::default(),
+            events: Events::default(),
+            announcements: Announcements::default(),
             outbox: Outbox::default(),
             buffer: FrameBuffer::default(),
             timers: TimerTable::default(),
@@ -346,6 +356,9 @@ impl Bridge {
             self.conflicts.note(now, Conflict::SeveralAutopilots);
         }
         self.look_after_streams(now);
+        for at in 0..self.roster.len() {
+            self.announce_state(now, at);
+        }
     }
 
     /// A heartbeat of each manager on `channels`.
@@ -447,7 +460,32 @@ impl Bridge {
                 self.answer(now, channel.into(), component, &message);
             }
             ManagerOutput::Steer(setpoint) => self.roster.get_mut(at).driver.handle_setpoint(now, setpoint),
+            ManagerOutput::Event(event) => self.handle_event(now, at, event),
         }
+    }
+
+    /// An event is remembered, and said where the pilot must know it.
+    fn handle_event(&mut self, now: Timestamp, at: usize, event: Event) {
+        let gimbal = self.roster.get_mut(at);
+        let (component, subject) = (gimbal.component, subject(gimbal));
+        self.events.note(now, subject.name, event);
+        let announcement = self.announcements.handle_event(now, subject, &event);
+        self.announce(now, component, announcement);
+        self.announce_state(now, at);
+    }
+
+    fn announce_state(&mut self, now: Timestamp, at: usize) {
+        let gimbal = self.roster.get_mut(at);
+        let (component, state, subject) = (gimbal.component, gimbal.manager.state(), subject(gimbal));
+        let announcement = self.announcements.handle_state(now, subject, state);
+        self.announce(now, component, announcement);
+    }
+
+    /// To everybody but gimbals, which have no use for it.
+    fn announce(&mut self, now: Timestamp, component: u8, announcement: Option<Announcement>) {
+        let Some(Announcement { severity, text }) = announcement else { return };
+        let channels = self.channels.open_set().without(self.channels.with_role(Role::Gimbal));
+        self.send(now, channels, component, &messages::status_text(severity, &text));
     }
 
     fn channels_of_device(&self, device: MavId) -> ChannelSet {
@@ -494,4 +532,10 @@ impl Bridge {
 
 fn surroundings<'a>(vehicle: &'a Vehicle, autopilot: Option<MavId>, ranks: &'a Ranks) -> Surroundings<'a> {
     Surroundings { vehicle, autopilot, ranks, overheard: false, other_vehicle: false }
+}
+
+/// The gimbal as texts about it name it.
+fn subject(gimbal: &Gimbal) -> Subject<'_> {
+    let settings = gimbal.manager.settings();
+    Subject { manager: gimbal.component, name: &settings.name, takeover: settings.takeover }
 }

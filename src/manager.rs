@@ -4,6 +4,7 @@
 //! ([`control`], [`tracking`], [`intervals`]); this machine puts them in order.
 
 pub mod control;
+pub mod events;
 pub mod intervals;
 mod manual;
 pub mod messages;
@@ -18,7 +19,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 use crate::channel::{ChannelId, ChannelSet};
-use crate::geometry::Angle;
+use crate::geometry::{Angle, Position};
 use crate::gimbals::capabilities::Capabilities;
 use crate::gimbals::report::{GimbalStatus, Identity, Report};
 use crate::gimbals::setpoint::Setpoint;
@@ -29,6 +30,7 @@ use crate::wire::MavId;
 use crate::wire::dialect::MavMessage;
 use crate::wire::ids::{CommandResult, FailureFlags, GimbalFlags};
 use control::{Change, Control, PRIMARY_SILENCE, Place, Policy};
+use events::{Event, RatesEnd};
 use intervals::{DEFAULT_STATUS_INTERVAL, Schedule};
 use messages::Interval;
 use rank::Ranks;
@@ -86,6 +88,8 @@ pub enum ManagerOutput {
         channel: ChannelId,
     },
     Steer(Setpoint),
+    /// For whoever looks.
+    Event(Event),
 }
 
 /// How the gimbal is.
@@ -129,6 +133,8 @@ pub struct GimbalManager {
     primary_demand: Option<Timestamp>,
     /// The flags that the last 281 carried.
     told_flags: GimbalFlags,
+    /// Where the gimbal was last told to look, of which an event told.
+    told_roi: Option<Position>,
     rejected: BTreeMap<MavId, BTreeMap<&'static str, u64>>,
     outputs: VecDeque<ManagerOutput>,
 }
@@ -151,6 +157,7 @@ impl GimbalManager {
             heading_bias: Angle::ZERO,
             primary_demand: None,
             told_flags: GimbalFlags::empty(),
+            told_roi: None,
             rejected: BTreeMap::new(),
             outputs: VecDeque::new(),
         }
@@ -186,7 +193,8 @@ impl GimbalManager {
 
     /// A message meant for this manager was malformed.
     pub fn count_refusal(&mut self, sender: MavId, reason: &'static str) {
-        tracing::debug!(gimbal = self.settings.name, %sender, reason, "refused");
+        let holder = self.control.primary().filter(|_| control::STANDS_IN_THE_WAY.contains(&reason));
+        self.tell(Event::Refused { who: sender, reason, holder });
         if self.rejected.len() >= MAX_COUNTED_SENDERS && !self.rejected.contains_key(&sender) {
             return;
         }
@@ -199,16 +207,16 @@ impl GimbalManager {
             Report::Restarted => {
                 self.tracking.forget();
                 self.heading_bias = Angle::ZERO;
-                tracing::info!(gimbal = self.settings.name, "gimbal restarted");
+                self.tell(Event::Restarted { device: self.device });
             }
             Report::Alive { device } => {
                 if self.device != Some(device) {
                     self.tracking.forget();
                     self.heading_bias = Angle::ZERO;
                 }
-                self.device = Some(device);
+                let known = self.device.replace(device) == Some(device);
                 self.state = DeviceState::Alive;
-                tracing::info!(gimbal = self.settings.name, %device, "gimbal found");
+                self.tell(if known { Event::Back { device } } else { Event::Found { device } });
             }
             Report::Known(identity, capabilities) => {
                 let changed = self.identity != identity || self.capabilities != Some(capabilities);
@@ -232,7 +240,7 @@ impl GimbalManager {
                 self.state = DeviceState::Lost;
                 self.status = None;
                 self.tracking.forget();
-                tracing::warn!(gimbal = self.settings.name, "gimbal lost");
+                self.tell(Event::Lost { device: self.device });
             }
         }
         self.carry_out(now, around);
@@ -249,8 +257,10 @@ impl GimbalManager {
     pub fn handle_timeout(&mut self, now: Timestamp, around: Surroundings<'_>) {
         self.end_leases(now);
         if self.source_lost_at().is_some_and(|at| at <= now) {
-            tracing::info!(gimbal = self.settings.name, "rotation stopped: who asked for it is silent");
             self.tracking.stop_rates(now);
+            if let Some(who) = self.tracking.source() {
+                self.tell(Event::RatesEnded { who, end: RatesEnd::SenderSilent });
+            }
         }
         let due = self.status_schedule.take_due(now);
         if !due.is_empty()
@@ -428,13 +438,28 @@ impl GimbalManager {
         }
     }
 
+    fn tell(&mut self, event: Event) {
+        self.outputs.push_back(ManagerOutput::Event(event));
+    }
+
     /// After each event: a setpoint that is due goes out, and a change of the flags is told.
     fn carry_out(&mut self, now: Timestamp, around: Surroundings<'_>) {
+        let roi = self.tracking.roi();
+        if roi != self.told_roi {
+            self.told_roi = roi;
+            let who = self.tracking.source();
+            self.tell(if roi.is_some() { Event::RoiStarted { who } } else { Event::RoiEnded { who } });
+        }
         if let Some(capabilities) = self.capabilities {
             let situation = self.situation(now, &capabilities, around);
             if let Some(setpoint) = self.tracking.steer(now, &situation) {
                 self.outputs.push_back(ManagerOutput::Steer(setpoint));
             }
+        }
+        if self.tracking.take_timed_out()
+            && let Some(who) = self.tracking.source()
+        {
+            self.tell(Event::RatesEnded { who, end: RatesEnd::TimedOut });
         }
         let flags = self.flags();
         if flags != self.told_flags {
@@ -473,12 +498,10 @@ impl GimbalManager {
         if primary_changed || source_lost_its_place {
             self.tracking.stop_rates(now);
         }
-        for Change { place, how, who, from, to } in changes {
-            let name = |id: &Option<MavId>| id.map_or_else(|| "nobody".to_owned(), |id| id.to_string());
-            let (from, to) = (name(from), name(to));
-            tracing::info!(gimbal = self.settings.name, ?place, ?how, %who, from, to, "control changed");
-        }
         self.broadcast_status(now);
+        for change in changes {
+            self.tell(Event::Control(*change));
+        }
     }
 
     /// When a rotation ends because who asked for it was not heard for the lease, however long its rate may last.

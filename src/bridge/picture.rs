@@ -13,6 +13,7 @@ use super::snapshot::{
 use crate::channel::ChannelId;
 use crate::geometry::{AngularRate, YawFrame};
 use crate::gimbals::setpoint::Setpoint;
+use crate::manager::control::Place;
 use crate::manager::tracking::Tracking;
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
@@ -34,6 +35,7 @@ impl Bridge {
                 .map(|gimbal| self.gimbal_snapshot(now, gimbal))
                 .collect(),
             conflicts: self.conflicts.current(now).map(|conflict| conflict.describe()).collect(),
+            events: self.events.snapshot(now, self.started),
         }
     }
 
@@ -107,6 +109,7 @@ impl Bridge {
         let manager = &gimbal.manager;
         let identity = manager.identity();
         let text = |text: &String| Some(text.clone()).filter(|text| !text.is_empty());
+        let held_for = |place| manager.control().holder(place).map(|holder| millis(now.since(holder.since)));
         let failures = manager.status().map_or(FailureFlags::empty(), |(_, status)| status.failures);
         GimbalSnapshot {
             name: manager.settings().name.clone(),
@@ -126,6 +129,10 @@ impl Bridge {
             setpoint: setpoint_snapshot(manager.tracking()),
             primary: manager.control().primary().map(|id| id.to_string()),
             secondary: manager.control().secondary().map(|id| id.to_string()),
+            primary_age_ms: held_for(Place::Primary),
+            secondary_age_ms: held_for(Place::Secondary),
+            lender: manager.control().lender().map(|id| id.to_string()),
+            takeover: manager.settings().takeover.name().to_owned(),
             roi: manager.tracking().roi().map(|place| RoiSnapshot {
                 latitude_deg: place.latitude_deg,
                 longitude_deg: place.longitude_deg,
@@ -193,6 +200,6 @@ fn failure_flag_names(flags: FailureFlags) -> Vec<String> {
     flags.iter_names().map(|(name, _)| name.to_lowercase()).collect()
 }
 
-fn millis(duration: Duration) -> u64 {
+pub(super) fn millis(duration: Duration) -> u64 {
     duration.as_millis().try_into().unwrap_or(u64::MAX)
 }

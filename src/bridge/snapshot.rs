@@ -17,6 +17,37 @@ pub struct Snapshot {
     pub vehicle: VehicleSnapshot,
     pub gimbals: Vec<GimbalSnapshot>,
     pub conflicts: Vec<String>,
+    /// What happened lately, the latest first.
+    pub events: Vec<EventSnapshot>,
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct EventSnapshot {
+    /// Different for each event since the start, and rising.
+    pub id: u64,
+    /// When it last happened, in seconds since the start.
+    pub at_s: f64,
+    pub age_ms: u64,
+    /// When it first happened: the same refusal again and again is one event.
+    pub first_at_s: f64,
+    pub count: u64,
+    pub gimbal: String,
+    /// `taken`, `taken_over`, `borrowed`, `restored`, `delegated`, `released`, `cleared`, `lapsed`, `system_gone`,
+    /// `refused`, `gimbal_found`, `gimbal_back`, `gimbal_lost`, `gimbal_restarted`, `rates_ended`, `roi_started` or
+    /// `roi_ended`.
+    pub what: String,
+    /// Of control: `primary` or `secondary`.
+    pub place: Option<String>,
+    /// Who did it, or to whom it happened.
+    pub who: Option<String>,
+    /// Who had control before; of a refusal, who has it and so stood in the way.
+    pub from: Option<String>,
+    /// Who has control from then on.
+    pub to: Option<String>,
+    /// Why somebody was refused, or a rotation ended.
+    pub reason: Option<String>,
+    /// The same as a sentence.
+    pub text: String,
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -87,6 +118,13 @@ pub struct GimbalSnapshot {
     /// Who holds primary control, as `system/component`.
     pub primary: Option<String>,
     pub secondary: Option<String>,
+    /// For how long they have held it.
+    pub primary_age_ms: Option<u64>,
+    pub secondary_age_ms: Option<u64>,
+    /// Who gets primary control back from the autopilot, which has borrowed it.
+    pub lender: Option<String>,
+    /// Who may take control from a holder: `open`, `ask`, `priority` or `exclusive`.
+    pub takeover: String,
     pub roi: Option<RoiSnapshot>,
     pub flags: Vec<String>,
     pub failure_flags: Vec<String>,

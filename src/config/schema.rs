@@ -25,10 +25,10 @@ const ROLES: &[(&str, Role)] = &[
 const FAMILIES: &[(&str, Family)] =
     &[(Family::Auto.name(), Family::Auto), (Family::MavlinkV2.name(), Family::MavlinkV2)];
 const TAKEOVERS: &[(&str, Takeover)] = &[
-    ("open", Takeover::Open),
-    ("ask", Takeover::Ask),
-    ("priority", Takeover::Priority),
-    ("exclusive", Takeover::Exclusive),
+    (Takeover::Open.name(), Takeover::Open),
+    (Takeover::Ask.name(), Takeover::Ask),
+    (Takeover::Priority.name(), Takeover::Priority),
+    (Takeover::Exclusive.name(), Takeover::Exclusive),
 ];
 const YAW_FRAMES: &[(&str, DeviceYawFrame)] =
     &[("auto", DeviceYawFrame::Auto), ("vehicle", DeviceYawFrame::Vehicle), ("earth", DeviceYawFrame::Earth)];

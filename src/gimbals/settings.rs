@@ -66,6 +66,17 @@ pub enum Takeover {
     Exclusive,
 }
 
+impl Takeover {
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Open => "open",
+            Self::Ask => "ask",
+            Self::Priority => "priority",
+            Self::Exclusive => "exclusive",
+        }
+    }
+}
+
 /// In which frame the device wants its yaw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DeviceYawFrame {

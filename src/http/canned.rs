@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use crate::bridge::snapshot::{
-    AttitudeSnapshot, GimbalSnapshot, LinkSnapshot, PeerSnapshot, RoiSnapshot, SetpointSnapshot, Snapshot,
-    VehicleSnapshot,
+    AttitudeSnapshot, EventSnapshot, GimbalSnapshot, LinkSnapshot, PeerSnapshot, RoiSnapshot, SetpointSnapshot,
+    Snapshot, VehicleSnapshot,
 };
 
 /// Two links, of which one is down; one gimbal that is held, and one that is searched for.
@@ -30,6 +30,7 @@ pub fn snapshot() -> Snapshot {
         },
         gimbals: vec![held_gimbal(), searched_gimbal()],
         conflicts: vec!["1/191 is also used by 10.0.0.7: set its component id to another value".into()],
+        events: vec![refusal(), take_over()],
     }
 }
 
@@ -97,6 +98,10 @@ fn held_gimbal() -> GimbalSnapshot {
         }),
         primary: Some("255/190".into()),
         secondary: None,
+        primary_age_ms: Some(61_500),
+        secondary_age_ms: None,
+        lender: None,
+        takeover: "ask".into(),
         roi: Some(RoiSnapshot { latitude_deg: 47.4, longitude_deg: 8.55, altitude_amsl_m: 430.0 }),
         flags: vec!["yaw_lock".into(), "roll_lock".into()],
         failure_flags: vec!["motor_error".into()],
@@ -111,6 +116,43 @@ fn searched_gimbal() -> GimbalSnapshot {
         family: "auto".into(),
         manager_component_id: 192,
         state: "searching".into(),
+        takeover: "open".into(),
         ..GimbalSnapshot::default()
+    }
+}
+
+fn refusal() -> EventSnapshot {
+    EventSnapshot {
+        id: 8,
+        at_s: 3725.25,
+        age_ms: 250,
+        first_at_s: 3700.0,
+        count: 12,
+        gimbal: "camera".into(),
+        what: "refused".into(),
+        place: None,
+        who: Some("1/100".into()),
+        from: Some("255/190".into()),
+        to: None,
+        reason: Some("not_in_control".into()),
+        text: "1/100 was refused: not in control; 255/190 is in control".into(),
+    }
+}
+
+fn take_over() -> EventSnapshot {
+    EventSnapshot {
+        id: 7,
+        at_s: 3664.0,
+        age_ms: 61_500,
+        first_at_s: 3664.0,
+        count: 1,
+        gimbal: "camera".into(),
+        what: "taken_over".into(),
+        place: Some("primary".into()),
+        who: Some("255/190".into()),
+        from: Some("1/1".into()),
+        to: Some("255/190".into()),
+        reason: None,
+        text: "255/190 took control from 1/1".into(),
     }
 }

@@ -59,7 +59,8 @@ fn status_is_the_whole_snapshot() {
                     "mode": "angle", "pitch_deg": -45.0, "yaw_deg": 120.0, "yaw_frame": "earth",
                     "pitch_rate_dps": null, "yaw_rate_dps": null, "source": "255/190",
                 },
-                "primary": "255/190", "secondary": null,
+                "primary": "255/190", "secondary": null, "primary_age_ms": 61_500, "secondary_age_ms": null,
+                "lender": null, "takeover": "ask",
                 "roi": {"latitude_deg": 47.4, "longitude_deg": 8.55, "altitude_amsl_m": 430.0},
                 "flags": ["yaw_lock", "roll_lock"], "failure_flags": ["motor_error"],
                 "rejected": {"1/100": {"not_in_control": 12}},
@@ -70,11 +71,24 @@ fn status_is_the_whole_snapshot() {
                 "attitude": {
                     "roll_deg": null, "pitch_deg": null, "yaw_vehicle_deg": null, "yaw_earth_deg": null, "age_ms": null,
                 },
-                "setpoint": null, "primary": null, "secondary": null, "roi": null,
+                "setpoint": null, "primary": null, "secondary": null, "primary_age_ms": null, "secondary_age_ms": null,
+                "lender": null, "takeover": "open", "roi": null,
                 "flags": [], "failure_flags": [], "rejected": {},
             },
         ],
         "conflicts": ["1/191 is also used by 10.0.0.7: set its component id to another value"],
+        "events": [
+            {
+                "id": 8, "at_s": 3725.25, "age_ms": 250, "first_at_s": 3700.0, "count": 12, "gimbal": "camera",
+                "what": "refused", "place": null, "who": "1/100", "from": "255/190", "to": null,
+                "reason": "not_in_control", "text": "1/100 was refused: not in control; 255/190 is in control",
+            },
+            {
+                "id": 7, "at_s": 3664.0, "age_ms": 61_500, "first_at_s": 3664.0, "count": 1, "gimbal": "camera",
+                "what": "taken_over", "place": "primary", "who": "255/190", "from": "1/1", "to": "255/190",
+                "reason": null, "text": "255/190 took control from 1/1",
+            },
+        ],
     });
     assert_eq!(answer.json(), expected);
 }

@@ -91,6 +91,10 @@ const QUIRK_MEMORY: Duration = Duration::from_secs(5);
 /// The secondary holder may set angles when the primary was silent for so long.
 pub const PRIMARY_SILENCE: Duration = Duration::from_secs(2);
 
+/// Reasons of refusals that lie in who holds primary control.
+pub const STANDS_IN_THE_WAY: [&str; 5] =
+    ["not_in_control", "primary_is_active", "holder_must_release", "holder_ranks_no_lower", "exclusively_held"];
+
 impl Control {
     pub fn primary(&self) -> Option<MavId> {
         self.primary.map(|holder| holder.id)

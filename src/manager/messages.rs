@@ -9,7 +9,7 @@ use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 use crate::wire::dialect::{
     COMMAND_ACK_DATA, COMPONENT_INFORMATION_BASIC_DATA, CharArray, GIMBAL_MANAGER_INFORMATION_DATA,
-    GIMBAL_MANAGER_STATUS_DATA, HEARTBEAT_DATA, MESSAGE_INTERVAL_DATA, MavMessage,
+    GIMBAL_MANAGER_STATUS_DATA, HEARTBEAT_DATA, MESSAGE_INTERVAL_DATA, MavMessage, STATUSTEXT_DATA,
 };
 use crate::wire::ids::{CapFlags, CommandResult, GimbalFlags, mav_autopilot, mav_type, protocol_capability};
 
@@ -85,6 +85,11 @@ pub fn status(
         secondary_control_sysid: secondary.system,
         secondary_control_compid: secondary.component,
     })
+}
+
+/// `STATUSTEXT` (253) in one piece.
+pub fn status_text(severity: u8, text: &str) -> MavMessage {
+    MavMessage::STATUSTEXT(STATUSTEXT_DATA { severity, text: CharArray::from(text), id: 0, chunk_seq: 0 })
 }
 
 /// `COMMAND_ACK` to whoever sent the command.

@@ -40,6 +40,8 @@ pub struct Tracking {
     /// The aim was carried on up to here.
     carried_to: Timestamp,
     last: Option<Setpoint>,
+    /// A rate has ended because it was not refreshed, and nobody has asked yet.
+    timed_out: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,6 +64,7 @@ impl Tracking {
             next: None,
             carried_to: Timestamp::ZERO,
             last: None,
+            timed_out: false,
         }
     }
 
@@ -177,7 +180,13 @@ impl Tracking {
         {
             turn.stop(now);
             self.next = Some(now);
+            self.timed_out = true;
         }
+    }
+
+    /// Whether a rate has ended because it was not refreshed; true once.
+    pub fn take_timed_out(&mut self) -> bool {
+        std::mem::take(&mut self.timed_out)
     }
 
     /// The latest setpoint, as the device was told.
@@ -237,10 +246,13 @@ impl Tracking {
             }
             Aim::Point(point) => {
                 let limits = &situation.capabilities.limits;
-                point.roll.carry_on(now, passed, |angle| limits.clamp_roll(angle));
-                point.pitch.carry_on(now, passed, |angle| limits.clamp_pitch(angle));
                 let (frame, heading) = (point.frame, situation.heading);
-                point.yaw.carry_on(now, passed, |angle| clamp_yaw(angle, frame, heading, situation));
+                let timed_out = [
+                    point.roll.carry_on(now, passed, |angle| limits.clamp_roll(angle)),
+                    point.pitch.carry_on(now, passed, |angle| limits.clamp_pitch(angle)),
+                    point.yaw.carry_on(now, passed, |angle| clamp_yaw(angle, frame, heading, situation)),
+                ];
+                self.timed_out |= timed_out.contains(&true);
             }
             Aim::Idle | Aim::Retract | Aim::Neutral | Aim::Roi(_) => {}
         }

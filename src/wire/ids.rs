@@ -167,6 +167,12 @@ pub mod mav_state {
     pub const POWEROFF: u8 = 7;
 }
 
+/// `MAV_SEVERITY`, of a `STATUSTEXT`.
+pub mod severity {
+    pub const WARNING: u8 = 4;
+    pub const NOTICE: u8 = 5;
+}
+
 /// `MAV_FRAME`, as far as positions come in it.
 pub mod mav_frame {
     pub const GLOBAL: u8 = 0;

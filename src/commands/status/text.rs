@@ -3,8 +3,13 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use crate::bridge::snapshot::{GimbalSnapshot, LinkSnapshot, SetpointSnapshot, Snapshot, VehicleSnapshot};
+use crate::bridge::snapshot::{
+    EventSnapshot, GimbalSnapshot, LinkSnapshot, SetpointSnapshot, Snapshot, VehicleSnapshot,
+};
 use crate::http::readiness::Readiness;
+
+/// So many events fit a terminal beside the rest.
+const SHOWN_EVENTS: usize = 8;
 
 /// The whole snapshot, for a person.
 pub fn report(snapshot: &Snapshot) -> String {
@@ -34,6 +39,10 @@ pub fn report(snapshot: &Snapshot) -> String {
     }
     for each in &snapshot.gimbals {
         gimbal(&mut out, each);
+    }
+    if !snapshot.events.is_empty() {
+        out.heading("events");
+        events(&mut out, &snapshot.events);
     }
     out.0
 }
@@ -119,9 +128,15 @@ fn gimbal(out: &mut Lines, gimbal: &GimbalSnapshot) {
             age(attitude.age_ms)
         ),
     );
-    let primary = gimbal.primary.as_deref().unwrap_or("nobody");
-    let secondary = gimbal.secondary.as_ref().map(|id| format!("  secondary {id}")).unwrap_or_default();
-    out.fact("control", &format!("{primary}{secondary}"));
+    let held = |id: &Option<String>, ms: Option<u64>| {
+        let since = ms.map(|ms| format!(" for {}", duration(ms as f64 / 1_000.0))).unwrap_or_default();
+        id.as_ref().map(|id| format!("{id}{since}"))
+    };
+    let primary = held(&gimbal.primary, gimbal.primary_age_ms).unwrap_or_else(|| "nobody".to_owned());
+    let lender = gimbal.lender.as_ref().map(|id| format!("  borrowed from {id}")).unwrap_or_default();
+    let secondary = held(&gimbal.secondary, gimbal.secondary_age_ms);
+    let secondary = secondary.map(|held| format!("  secondary {held}")).unwrap_or_default();
+    out.fact("control", &format!("{primary}{lender}{secondary}"));
     if let Some(demand) = &gimbal.setpoint {
         out.fact("setpoint", &setpoint(demand));
     }
@@ -133,6 +148,18 @@ fn gimbal(out: &mut Lines, gimbal: &GimbalSnapshot) {
     out.fact_unless_empty("flags", &gimbal.flags.join(" "));
     for (sender, reasons) in &gimbal.rejected {
         out.fact("refused", &format!("{sender}: {}", counts(reasons)));
+    }
+}
+
+/// The latest, each with its age.
+fn events(out: &mut Lines, events: &[EventSnapshot]) {
+    let row = |event: &EventSnapshot| {
+        let times = if event.count > 1 { format!(" ({} times)", event.count) } else { String::new() };
+        [age(Some(event.age_ms)), event.gimbal.clone(), format!("{}{times}", event.text)]
+    };
+    let rows: Vec<[String; 3]> = events.iter().take(SHOWN_EVENTS).map(row).collect();
+    for line in aligned(&rows) {
+        out.line(1, &line);
     }
 }
 
@@ -273,7 +300,7 @@ vehicle  alive  ardupilot  system 1
 gimbal camera  alive  mavlink_v2  device 1/154  manager 191
   product   Acme Pixy 7.8.1
   attitude  roll 0.3°  pitch -42.5°  yaw 30.0° from the nose, 117.0° from North  18 ms ago
-  control   255/190
+  control   255/190 for 1 min 1 s
   setpoint  angle  pitch -45.0°  yaw 120.0° from North  by 255/190
   roi       47.400000° 8.550000°  430.0 m above mean sea level
   failures  motor_error
@@ -283,6 +310,10 @@ gimbal camera  alive  mavlink_v2  device 1/154  manager 191
 gimbal lamp  searching  auto  manager 192
   attitude  roll –  pitch –  yaw – from the nose, – from North  never heard
   control   nobody
+
+events
+  250 ms ago     camera  1/100 was refused: not in control; 255/190 is in control (12 times)
+  1 min 1 s ago  camera  255/190 took control from 1/1
 ";
         assert_eq!(report(&canned::snapshot()), expected);
     }

@@ -98,7 +98,8 @@ impl Axis {
         Self { at, motion: Motion::Still }
     }
 
-    pub(super) fn carry_on(&mut self, now: Timestamp, passed: Duration, clamp: impl Fn(Angle) -> Angle) {
+    /// True when a rate has just ended by itself.
+    pub(super) fn carry_on(&mut self, now: Timestamp, passed: Duration, clamp: impl Fn(Angle) -> Angle) -> bool {
         match self.motion {
             Motion::Still => {}
             Motion::Slew { to, rate } => {
@@ -114,9 +115,11 @@ impl Axis {
                 self.at = clamp(self.at + rate.over(passed));
                 if until.is_some_and(|until| until <= now) {
                     self.motion = Motion::Still;
+                    return true;
                 }
             }
         }
+        false
     }
 }
 

@@ -5,6 +5,7 @@ mod bad_days;
 mod commands;
 mod control;
 mod control_takeover;
+mod events;
 mod frames;
 mod presence;
 mod setpoints;

@@ -128,11 +128,15 @@ fn the_autopilot_gives_back_what_it_borrowed() {
         let take = configure([1.0, 1.0], [-1.0, -1.0]);
 
         let borrowed = world.ask(places.autopilot, AUTOPILOT, &take);
-        assert_eq!((ids(&borrowed), told_control(&borrowed)), (vec![77, 281], Some((AUTOPILOT, NOBODY))));
+        assert_eq!((ids(&borrowed), told_control(&borrowed)), (vec![77, 281, 253], Some((AUTOPILOT, NOBODY))));
         assert_eq!(told_control(&world.take(places.ground)), Some((AUTOPILOT, NOBODY)), "told to all at once");
 
         let given_back = world.ask(places.autopilot, AUTOPILOT, &configure([release, release], [-1.0, -1.0]));
-        assert_eq!((ids(&given_back), told_control(&given_back)), (vec![77, 281], Some((GCS, NOBODY))), "{release}");
+        assert_eq!(
+            (ids(&given_back), told_control(&given_back)),
+            (vec![77, 281, 253], Some((GCS, NOBODY))),
+            "{release}"
+        );
         assert_eq!(world.result_of(places.ground, GCS, &pitchyaw(-10.0, 0.0, NAN, NAN, 44.0)), Some(ACCEPTED));
     }
 }
@@ -252,7 +256,7 @@ fn whoever_was_given_control_must_be_heard() {
 }
 
 /// A world under a policy, in which everybody has said what it is.
-fn under(takeover: Takeover) -> (World, Places) {
+pub(super) fn under(takeover: Takeover) -> (World, Places) {
     with(takeover, ControlSettings::default())
 }
 

@@ -1,0 +1,245 @@
+//! What the pilot must know, as the words of `STATUSTEXT` (253) that every ground station shows.
+
+use std::time::Duration;
+
+use super::allowance::Allowance;
+use crate::gimbals::settings::Takeover;
+use crate::manager::DeviceState;
+use crate::manager::control::{Change, How, Place};
+use crate::manager::events::Event;
+use crate::timestamp::Timestamp;
+use crate::wire::MavId;
+use crate::wire::ids::severity;
+
+/// The same is said of one gimbal and sender at most so often.
+const AGAIN_AFTER: Duration = Duration::from_secs(10);
+
+/// All texts together: so many at once …
+const BURST: u32 = 5;
+/// … and one more after each of these.
+const SPACING: Duration = Duration::from_millis(500);
+/// So many of them are kept for what matters more than a refusal.
+const NOT_FOR_REFUSALS: u32 = 3;
+
+/// So many texts are remembered as said lately.
+const MAX_SAID: usize = 64;
+
+/// The length of the field; a longer text would come in pieces, which old ground stations do not put together.
+const MAX_LEN: usize = 50;
+
+/// Decides what is said, and how often.
+#[derive(Debug)]
+pub struct Announcements {
+    said: Vec<(Key, Timestamp)>,
+    allowance: Allowance,
+    /// The manager components whose gimbals were last said to be lost.
+    said_lost: Vec<u8>,
+}
+
+/// What is not said again within [`AGAIN_AFTER`]: about the gimbal of which manager component, what, and of whom.
+type Key = (u8, Kind, Option<MavId>);
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Lost,
+    Back,
+    Borrowed,
+    GivenBack,
+    TakenOver,
+    Refused,
+}
+
+/// One text to be sent.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Announcement {
+    pub severity: u8,
+    pub text: String,
+}
+
+/// The gimbal of which something is said.
+#[derive(Clone, Copy, Debug)]
+pub struct Subject<'a> {
+    pub manager: u8,
+    pub name: &'a str,
+    pub takeover: Takeover,
+}
+
+impl Default for Announcements {
+    fn default() -> Self {
+        Self { said: Vec::new(), allowance: Allowance::new(BURST, SPACING), said_lost: Vec::new() }
+    }
+}
+
+impl Announcements {
+    /// What is said of `event`. That a gimbal is lost or back is said by [`handle_state`](Self::handle_state).
+    pub fn handle_event(&mut self, now: Timestamp, subject: Subject<'_>, event: &Event) -> Option<Announcement> {
+        let (kind, who, text) = match *event {
+            Event::Control(Change { place: Place::Primary, how, who, from: Some(from), to: Some(to) }) => match how {
+                How::Borrowed => (Kind::Borrowed, who, "autopilot borrowed control".to_owned()),
+                How::Restored => (Kind::GivenBack, to, format!("autopilot gave control back to {to}")),
+                How::TakenOver => (Kind::TakenOver, to, format!("{to} took control from {from}")),
+                _ => return None,
+            },
+            Event::Control(Change { place: Place::Primary, how: How::Restored, to: Some(to), .. }) => {
+                (Kind::GivenBack, to, format!("autopilot gave control back to {to}"))
+            }
+            // An exclusive holder is not bothered with what others want.
+            Event::Refused { holder: Some(_), .. } if subject.takeover == Takeover::Exclusive => return None,
+            Event::Refused { who, holder: Some(holder), reason: "holder_must_release" } => {
+                (Kind::Refused, who, format!("{who} asks {holder} for control"))
+            }
+            Event::Refused { who, holder: Some(holder), .. } => {
+                (Kind::Refused, who, format!("{who} refused, {holder} in control"))
+            }
+            _ => return None,
+        };
+        let (severity, kept) = match kind {
+            Kind::Refused => (severity::NOTICE, NOT_FOR_REFUSALS),
+            _ => (severity::NOTICE, 0),
+        };
+        self.may_say(now, (subject.manager, kind, Some(who)), kept)
+            .then(|| Announcement { severity, text: signed(subject.name, &text) })
+    }
+
+    /// Says that a gimbal is lost or back; called again and again, so that what could not be said at once is said later,
+    /// if it still holds.
+    pub fn handle_state(&mut self, now: Timestamp, subject: Subject<'_>, state: DeviceState) -> Option<Announcement> {
+        let known = self.said_lost.iter().position(|manager| *manager == subject.manager);
+        let (kind, severity, text) = match (state, known) {
+            (DeviceState::Lost, None) => (Kind::Lost, severity::WARNING, "gimbal lost"),
+            (DeviceState::Alive, Some(_)) => (Kind::Back, severity::NOTICE, "gimbal is back"),
+            (DeviceState::Searching, Some(at)) => {
+                // Another gimbal has taken the place of the one that was lost.
+                self.said_lost.swap_remove(at);
+                return None;
+            }
+            (DeviceState::Lost, Some(_)) | (DeviceState::Alive | DeviceState::Searching, None) => return None,
+        };
+        if !self.may_say(now, (subject.manager, kind, None), 0) {
+            return None;
+        }
+        match known {
+            Some(at) => drop(self.said_lost.swap_remove(at)),
+            None => self.said_lost.push(subject.manager),
+        }
+        Some(Announcement { severity, text: signed(subject.name, text) })
+    }
+
+    fn may_say(&mut self, now: Timestamp, key: Key, kept: u32) -> bool {
+        self.said.retain(|(_, at)| now.since(*at) < AGAIN_AFTER);
+        let said = self.said.iter().any(|(said, _)| *said == key);
+        if said || self.said.len() >= MAX_SAID || !self.allowance.take(now, kept) {
+            return false;
+        }
+        self.said.push((key, now));
+        true
+    }
+}
+
+/// The gimbal's name before the text, cut where the whole would be too long.
+fn signed(name: &str, text: &str) -> String {
+    let room = MAX_LEN.saturating_sub(text.len() + 2);
+    let name: String = name.chars().take(room).collect();
+    format!("{name}: {text}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GCS: MavId = MavId::new(255, 190);
+    const SCRIPT: MavId = MavId::new(245, 191);
+
+    /// "The same text kind per gimbal and sender at most once in 10 s."
+    #[test]
+    fn the_same_is_said_once_in_ten_seconds() {
+        let mut announcements = Announcements::default();
+        let mut said = Vec::new();
+        for millis in (0..20_000).step_by(20) {
+            for (manager, who) in [(191, SCRIPT), (191, MavId::new(1, 192)), (192, SCRIPT)] {
+                let now = Timestamp::from_millis(millis);
+                if announcements.handle_event(now, subject(manager, Takeover::Open), &refused(who)).is_some() {
+                    said.push((millis, manager, who));
+                }
+            }
+        }
+        let third = (500, 192, SCRIPT); // three at once are for what matters more
+        let expected = [(0, 191, SCRIPT), (0, 191, MavId::new(1, 192)), third];
+        assert_eq!(said[..3], expected);
+        assert_eq!(said[3..], [(10_000, 191, SCRIPT), (10_000, 191, MavId::new(1, 192)), (10_500, 192, SCRIPT)]);
+    }
+
+    /// "Overall at most a few per second"; what is held back of a gimbal that is lost is said when there is room.
+    #[test]
+    fn a_storm_of_events_is_no_storm_of_texts() {
+        let mut announcements = Announcements::default();
+        let mut said = 0;
+        for sender in 0..200 {
+            let event = refused(MavId::new(sender, 1));
+            said +=
+                u32::from(announcements.handle_event(Timestamp::ZERO, subject(191, Takeover::Open), &event).is_some());
+        }
+        assert_eq!(said, BURST - NOT_FOR_REFUSALS);
+        let mut lost = |millis, manager| {
+            let now = Timestamp::from_millis(millis);
+            announcements.handle_state(now, subject(manager, Takeover::Open), DeviceState::Lost).is_some()
+        };
+        assert_eq!([lost(0, 191), lost(0, 192), lost(0, 193), lost(0, 194)], [true, true, true, false]);
+        assert_eq!([lost(500, 191), lost(500, 194), lost(600, 194)], [false, true, false]);
+    }
+
+    /// A link that comes and goes: what is said last is how it is.
+    #[test]
+    fn a_gimbal_that_comes_and_goes_is_last_said_to_be_what_it_is() {
+        let mut announcements = Announcements::default();
+        let mut text = |secs, state| {
+            let now = Timestamp::from_secs(secs);
+            announcements.handle_state(now, subject(191, Takeover::Open), state).map(|announcement| announcement.text)
+        };
+        use DeviceState::{Alive, Lost, Searching};
+        assert_eq!(text(0, Alive), None);
+        assert_eq!(text(1, Lost).as_deref(), Some("camera: gimbal lost"));
+        assert_eq!(text(2, Alive).as_deref(), Some("camera: gimbal is back"));
+        assert_eq!(text(3, Lost), None, "said two seconds ago");
+        assert_eq!(text(11, Lost).as_deref(), Some("camera: gimbal lost"));
+        assert_eq!(text(12, Searching), None);
+        assert_eq!(text(13, Alive), None, "another gimbal is not back");
+    }
+
+    /// `takeover = "exclusive"`: "DENIED, without bothering the holder".
+    #[test]
+    fn an_exclusive_holder_is_not_bothered() {
+        let mut announcements = Announcements::default();
+        let exclusive = subject(191, Takeover::Exclusive);
+        assert_eq!(announcements.handle_event(Timestamp::ZERO, exclusive, &refused(SCRIPT)), None);
+    }
+
+    /// "At most 50 characters each", whatever the gimbal's name.
+    #[test]
+    fn a_text_is_never_too_long() {
+        let widest = MavId::new(255, 255);
+        let change = |how| Change { place: Place::Primary, how, who: widest, from: Some(widest), to: Some(widest) };
+        let events = [
+            Event::Control(change(How::TakenOver)),
+            Event::Control(change(How::Borrowed)),
+            Event::Control(change(How::Restored)),
+            Event::Refused { who: widest, reason: "holder_must_release", holder: Some(widest) },
+            Event::Refused { who: widest, reason: "not_in_control", holder: Some(widest) },
+        ];
+        for event in events {
+            let subject =
+                Subject { name: "a-gimbal-with-a-very-long-name-of-45-letters", ..subject(191, Takeover::Open) };
+            let said = Announcements::default().handle_event(Timestamp::ZERO, subject, &event).expect("it is said");
+            assert_eq!(said.text.len(), MAX_LEN, "{}", said.text);
+            assert!(said.text.starts_with("a-gimbal"), "{}", said.text);
+        }
+    }
+
+    fn subject(manager: u8, takeover: Takeover) -> Subject<'static> {
+        Subject { manager, name: "camera", takeover }
+    }
+
+    fn refused(who: MavId) -> Event {
+        Event::Refused { who, reason: "not_in_control", holder: Some(GCS) }
+    }
+}

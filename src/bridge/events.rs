@@ -1,0 +1,132 @@
+//! What happened lately, for whoever looks, and for the journal.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use super::allowance::Allowance;
+use super::snapshot::EventSnapshot;
+use crate::manager::control::Place;
+use crate::manager::events::Event;
+use crate::timestamp::Timestamp;
+
+/// So many events are remembered …
+const REMEMBERED: usize = 64;
+
+/// … and of these so many refusals: however many are refused, the changes of control stay to be seen.
+const REMEMBERED_REFUSALS: usize = 24;
+
+/// The journal of an operator gets so many events at once, and one more after each of these, however often two clients
+/// take control from one another.
+const JOURNAL_BURST: u32 = 20;
+const JOURNAL_SPACING: Duration = Duration::from_secs(1);
+
+/// The latest events of all gimbals, oldest first.
+#[derive(Debug)]
+pub struct Events {
+    entries: VecDeque<Entry>,
+    next_id: u64,
+    journal: Allowance,
+}
+
+#[derive(Debug)]
+struct Entry {
+    id: u64,
+    gimbal: String,
+    event: Event,
+    first: Timestamp,
+    latest: Timestamp,
+    count: u64,
+}
+
+impl Default for Events {
+    fn default() -> Self {
+        Self { entries: VecDeque::new(), next_id: 0, journal: Allowance::new(JOURNAL_BURST, JOURNAL_SPACING) }
+    }
+}
+
+impl Events {
+    /// Something happened around `gimbal`. The same request refused again and again is one event with a count.
+    pub fn note(&mut self, now: Timestamp, gimbal: &str, event: Event) {
+        if matches!(event, Event::Refused { .. }) {
+            let again = self.entries.iter().position(|entry| entry.is_repeated_by(gimbal, &event));
+            if let Some(mut entry) = again.and_then(|at| self.entries.remove(at)) {
+                entry.event = event;
+                entry.latest = now;
+                entry.count += 1;
+                entry.log(false);
+                self.entries.push_back(entry);
+                return;
+            }
+        }
+        self.make_room(&event);
+        let entry = Entry { id: self.next_id, gimbal: gimbal.to_owned(), event, first: now, latest: now, count: 1 };
+        entry.log(self.journal.take(now, 0));
+        self.next_id += 1;
+        self.entries.push_back(entry);
+    }
+
+    /// The latest first.
+    pub fn snapshot(&self, now: Timestamp, started: Timestamp) -> Vec<EventSnapshot> {
+        self.entries.iter().rev().map(|entry| entry.snapshot(now, started)).collect()
+    }
+
+    fn make_room(&mut self, event: &Event) {
+        let is_refusal = |entry: &Entry| matches!(entry.event, Event::Refused { .. });
+        let refusals = self.entries.iter().filter(|entry| is_refusal(entry)).count();
+        let too_many = matches!(event, Event::Refused { .. }) && refusals >= REMEMBERED_REFUSALS;
+        if too_many {
+            let oldest = self.entries.iter().position(is_refusal);
+            oldest.and_then(|at| self.entries.remove(at));
+        } else if self.entries.len() >= REMEMBERED {
+            self.entries.pop_front();
+        }
+    }
+}
+
+impl Entry {
+    fn is_repeated_by(&self, gimbal: &str, event: &Event) -> bool {
+        let same = |one: &Event, other: &Event| {
+            matches!((one, other), (Event::Refused { .. }, Event::Refused { .. }))
+                && (one.who(), one.reason()) == (other.who(), other.reason())
+        };
+        self.gimbal == gimbal && same(&self.event, event)
+    }
+
+    /// INFO for an operator's journal, as long as there is room (`told`); DEBUG for refusals, which come by the stream: the
+    /// first, the second, the fourth …
+    fn log(&self, told: bool) {
+        let Self { gimbal, event, count, .. } = self;
+        if matches!(event, Event::Refused { .. }) && !count.is_power_of_two() {
+            return;
+        }
+        let (what, text) = (event.name(), event.describe());
+        match event {
+            Event::Refused { .. } => tracing::debug!(gimbal, what, text, count, "event"),
+            Event::Lost { .. } => tracing::warn!(gimbal, what, text, "event"),
+            _ if told => tracing::info!(gimbal, what, text, "event"),
+            _ => tracing::debug!(gimbal, what, text, "event"),
+        }
+    }
+
+    fn snapshot(&self, now: Timestamp, started: Timestamp) -> EventSnapshot {
+        let place = self.event.place().map(|place| match place {
+            Place::Primary => "primary",
+            Place::Secondary => "secondary",
+        });
+        EventSnapshot {
+            id: self.id,
+            at_s: self.latest.since(started).as_secs_f64(),
+            age_ms: super::picture::millis(now.since(self.latest)),
+            first_at_s: self.first.since(started).as_secs_f64(),
+            count: self.count,
+            gimbal: self.gimbal.clone(),
+            what: self.event.name().to_owned(),
+            place: place.map(str::to_owned),
+            who: self.event.who().map(|id| id.to_string()),
+            from: self.event.from().map(|id| id.to_string()),
+            to: self.event.to().map(|id| id.to_string()),
+            reason: self.event.reason().map(str::to_owned),
+            text: self.event.describe(),
+        }
+    }
+}

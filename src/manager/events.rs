@@ -1,0 +1,208 @@
+//! What happened around a gimbal, as far as a person may want to know it.
+
+use super::control::{Change, How, Place};
+use crate::wire::MavId;
+
+/// Something that happened around one gimbal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// A place changed hands.
+    Control(Change),
+    /// A request was not done. `holder` is named where that is why.
+    Refused {
+        who: MavId,
+        reason: &'static str,
+        holder: Option<MavId>,
+    },
+    /// The device was heard, for the first time under that id.
+    Found {
+        device: MavId,
+    },
+    /// The device was heard again after it was lost.
+    Back {
+        device: MavId,
+    },
+    Lost {
+        device: Option<MavId>,
+    },
+    /// It does not do any more what it was told.
+    Restarted {
+        device: Option<MavId>,
+    },
+    /// A rotation was stopped because nobody asked for it any more.
+    RatesEnded {
+        who: MavId,
+        end: RatesEnd,
+    },
+    RoiStarted {
+        who: Option<MavId>,
+    },
+    /// `who` asked for something else, if anybody did.
+    RoiEnded {
+        who: Option<MavId>,
+    },
+}
+
+/// Why a rotation ended by itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RatesEnd {
+    /// It was not refreshed, or lasted as long as a command may.
+    TimedOut,
+    /// Who asked for it was not heard for the lease.
+    SenderSilent,
+}
+
+impl Event {
+    /// A word for programs.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Control(change) => match change.how {
+                How::Taken => "taken",
+                How::TakenOver => "taken_over",
+                How::Borrowed => "borrowed",
+                How::Restored => "restored",
+                How::Delegated => "delegated",
+                How::Released => "released",
+                How::Cleared => "cleared",
+                How::Lapsed => "lapsed",
+                How::SystemGone => "system_gone",
+            },
+            Self::Refused { .. } => "refused",
+            Self::Found { .. } => "gimbal_found",
+            Self::Back { .. } => "gimbal_back",
+            Self::Lost { .. } => "gimbal_lost",
+            Self::Restarted { .. } => "gimbal_restarted",
+            Self::RatesEnded { .. } => "rates_ended",
+            Self::RoiStarted { .. } => "roi_started",
+            Self::RoiEnded { .. } => "roi_ended",
+        }
+    }
+
+    /// Who did it, or to whom it happened.
+    pub const fn who(&self) -> Option<MavId> {
+        match *self {
+            Self::Control(Change { who, .. }) | Self::Refused { who, .. } | Self::RatesEnded { who, .. } => Some(who),
+            Self::Found { device } | Self::Back { device } => Some(device),
+            Self::Lost { device } | Self::Restarted { device } => device,
+            Self::RoiStarted { who } | Self::RoiEnded { who } => who,
+        }
+    }
+
+    /// Who had control before, or has it and so stood in the way.
+    pub const fn from(&self) -> Option<MavId> {
+        match *self {
+            Self::Control(Change { from, .. }) => from,
+            Self::Refused { holder, .. } => holder,
+            _ => None,
+        }
+    }
+
+    /// Who has control from now on.
+    pub const fn to(&self) -> Option<MavId> {
+        match *self {
+            Self::Control(Change { to, .. }) => to,
+            _ => None,
+        }
+    }
+
+    pub const fn place(&self) -> Option<Place> {
+        match *self {
+            Self::Control(Change { place, .. }) => Some(place),
+            _ => None,
+        }
+    }
+
+    /// Why, where there is more to say than the event's name does.
+    pub const fn reason(&self) -> Option<&'static str> {
+        match *self {
+            Self::Refused { reason, .. } => Some(reason),
+            Self::RatesEnded { end: RatesEnd::TimedOut, .. } => Some("timed_out"),
+            Self::RatesEnded { end: RatesEnd::SenderSilent, .. } => Some("sender_silent"),
+            _ => None,
+        }
+    }
+
+    /// A sentence for the person looking.
+    pub fn describe(&self) -> String {
+        match *self {
+            Self::Control(change) => describe_change(change),
+            Self::Refused { who, reason, holder } => {
+                let reason = reason.replace('_', " ");
+                match holder {
+                    Some(holder) => format!("{who} was refused: {reason}; {holder} is in control"),
+                    None => format!("{who} was refused: {reason}"),
+                }
+            }
+            Self::Found { device } => format!("gimbal found as {device}"),
+            Self::Back { device } => format!("gimbal {device} is back"),
+            Self::Lost { .. } => "gimbal lost".to_owned(),
+            Self::Restarted { .. } => "gimbal restarted; it holds still until somebody asks".to_owned(),
+            Self::RatesEnded { who, end: RatesEnd::TimedOut } => {
+                format!("rotation stopped: {who} did not ask for it again")
+            }
+            Self::RatesEnded { who, end: RatesEnd::SenderSilent } => {
+                format!("rotation stopped: {who}, who asked for it, is silent")
+            }
+            Self::RoiStarted { who } => by("points at a place", who),
+            Self::RoiEnded { who } => by("points at no place any more", who),
+        }
+    }
+}
+
+fn by(what: &str, who: Option<MavId>) -> String {
+    who.map_or_else(|| what.to_owned(), |who| format!("{what}, by {who}"))
+}
+
+fn describe_change(change: Change) -> String {
+    let Change { place, how, who, from, to } = change;
+    let control = match place {
+        Place::Primary => "control",
+        Place::Secondary => "secondary control",
+    };
+    let name = |id: Option<MavId>| id.map_or_else(|| "nobody".to_owned(), |id| id.to_string());
+    let (from, to) = (name(from), name(to));
+    match how {
+        How::Taken => format!("{who} took {control}"),
+        How::TakenOver if to == who.to_string() => format!("{who} took {control} from {from}"),
+        How::TakenOver => format!("{who} took {control} from {from} for {to}"),
+        How::Borrowed => format!("the autopilot borrowed {control} from {from}"),
+        How::Restored => format!("{to} has {control} back from the autopilot"),
+        How::Delegated => format!("{who} gave {control} to {to}"),
+        How::Released => format!("{who} released {control}"),
+        How::Cleared => format!("{who} ended the {control} of {from}"),
+        How::Lapsed => format!("{who} is silent and lost {control}"),
+        How::SystemGone => format!("{who} is no part of this vehicle and lost {control}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// "Who is in control, since when, why somebody was refused": as sentences.
+    #[test]
+    fn events_read_as_sentences() {
+        let (gcs, autopilot, script) = (MavId::new(255, 190), MavId::new(1, 1), MavId::new(245, 191));
+        let change = |how, who, from, to| Event::Control(Change { place: Place::Primary, how, who, from, to });
+        for (event, text) in [
+            (change(How::TakenOver, script, Some(gcs), Some(script)), "245/191 took control from 255/190"),
+            (change(How::TakenOver, script, Some(gcs), Some(autopilot)), "245/191 took control from 255/190 for 1/1"),
+            (
+                change(How::Borrowed, autopilot, Some(gcs), Some(autopilot)),
+                "the autopilot borrowed control from 255/190",
+            ),
+            (change(How::Restored, autopilot, None, Some(gcs)), "255/190 has control back from the autopilot"),
+            (change(How::Lapsed, gcs, Some(gcs), None), "255/190 is silent and lost control"),
+            (
+                Event::Refused { who: script, reason: "not_in_control", holder: Some(gcs) },
+                "245/191 was refused: not in control; 255/190 is in control",
+            ),
+            (
+                Event::Refused { who: script, reason: "unknown_gimbal", holder: None },
+                "245/191 was refused: unknown gimbal",
+            ),
+        ] {
+            assert_eq!(event.describe(), text);
+        }
+    }
+}
