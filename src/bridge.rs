@@ -8,7 +8,9 @@ mod announcements;
 mod channels;
 mod conflicts;
 mod delivery;
+mod devices;
 mod events;
+mod firewall;
 mod heartbeat;
 mod identity;
 mod outbox;
@@ -20,6 +22,7 @@ mod roster;
 mod sent;
 pub mod settings;
 pub mod snapshot;
+mod stations;
 mod streams;
 mod transactions;
 
@@ -43,6 +46,7 @@ use identity::Identity;
 use outbox::Outbox;
 use roster::{Gimbal, GimbalOutput, Roster};
 use settings::{FALLBACK_SYSTEM_ID, Role, Settings};
+use stations::Stations;
 use streams::AutopilotStreams;
 use transactions::{Asker, Order, Transactions};
 
@@ -104,8 +108,10 @@ pub struct Bridge {
     vehicle: Vehicle,
     /// The autopilot of our system, once it was heard.
     autopilot: Option<MavId>,
-    /// By system, the component that beats as its autopilot, and when it last did.
-    vehicles: Vec<Option<(u8, Timestamp)>>,
+    /// When it was last heard on a link that is not a ground link.
+    autopilot_heard: Option<Timestamp>,
+    /// By system, whose autopilot was heard.
+    vehicles: Vec<Option<KnownVehicle>>,
     ranks: Ranks,
     roster: Roster,
     streams: AutopilotStreams,
@@ -113,10 +119,21 @@ pub struct Bridge {
     conflicts: Conflicts,
     events: Events,
     announcements: Announcements,
+    stations: Stations,
     outbox: Outbox,
     buffer: FrameBuffer,
     timers: TimerTable<Timer>,
     shutting_down: bool,
+}
+
+/// A system that has an autopilot.
+#[derive(Clone, Copy, Debug)]
+struct KnownVehicle {
+    /// The component that beats as its autopilot.
+    component: u8,
+    heard: Timestamp,
+    /// It was never heard but where ground stations are.
+    is_on_ground_only: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -134,14 +151,16 @@ impl Bridge {
             router: Router::default(),
             vehicle: Vehicle::new(),
             autopilot: None,
+            autopilot_heard: None,
             vehicles: vec![None; 256],
             ranks: Ranks::default(),
             roster: Roster::new(&settings),
             streams: AutopilotStreams::default(),
             transactions: Transactions::default(),
-            conflicts: Conflicts::default(),
             events: Events::default(),
             announcements: Announcements::default(),
+            conflicts: Conflicts::new(settings.links.iter().map(|link| link.name.clone()).collect()),
+            stations: Stations::default(),
             outbox: Outbox::default(),
             buffer: FrameBuffer::default(),
             timers: TimerTable::default(),
@@ -321,12 +340,14 @@ impl Bridge {
             }
         }
         self.autopilot = None;
+        self.autopilot_heard = None;
         self.vehicle = Vehicle::new();
         self.transactions.clear();
         if let Some(system) = system
-            && let Some((component, _)) = self.vehicles[usize::from(system)]
+            && let Some(known) = self.vehicles[usize::from(system)]
+            && (!known.is_on_ground_only || self.is_believed(Role::Ground, system))
         {
-            self.take_autopilot(now, MavId::new(system, component));
+            self.take_autopilot(now, MavId::new(system, known.component));
         }
         if let Some(system) = system
             && !self.identity.is_bootstrap()
@@ -355,6 +376,7 @@ impl Bridge {
         if self.identity.autopilots(now).count() > 1 && self.settings.system_id == settings::SystemId::Auto {
             self.conflicts.note(now, Conflict::SeveralAutopilots);
         }
+        self.look_for_renamed(now);
         self.look_after_streams(now);
         for at in 0..self.roster.len() {
             self.announce_state(now, at);

@@ -213,6 +213,9 @@ impl GimbalManager {
                 if self.device != Some(device) {
                     self.tracking.forget();
                     self.heading_bias = Angle::ZERO;
+                    self.identity = Identity::default();
+                    self.capabilities = None;
+                    self.status = None;
                 }
                 let known = self.device.replace(device) == Some(device);
                 self.state = DeviceState::Alive;
@@ -326,6 +329,11 @@ impl GimbalManager {
 
     pub fn identity(&self) -> &Identity {
         &self.identity
+    }
+
+    /// Whether enough is known of the device to steer it.
+    pub fn is_known(&self) -> bool {
+        self.capabilities.is_some()
     }
 
     /// The latest attitude and when it came, however old.

@@ -3,22 +3,22 @@
 use std::time::Duration;
 
 use super::conflicts::Conflict;
+use super::roster::Place;
 use super::settings::Role;
-use super::{Bridge, LinkIndex, surroundings};
+use super::{Bridge, KnownVehicle, LinkIndex, surroundings};
 use crate::channel::{ChannelId, ChannelSet};
 use crate::manager::request::read_request;
-use crate::manager::settings::Firewall;
-use crate::manager::{DeviceState, Sender, Surroundings};
+use crate::manager::{Sender, Surroundings};
 use crate::timestamp::Timestamp;
-use crate::wire::dialect::{
-    GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA, GIMBAL_MANAGER_INFORMATION_DATA,
-    GIMBAL_MANAGER_STATUS_DATA, HEARTBEAT_DATA, SYSTEM_TIME_DATA,
-};
+use crate::wire::dialect::{HEARTBEAT_DATA, SYSTEM_TIME_DATA};
 use crate::wire::ids::{command, component, mav_autopilot, mav_type, message};
 use crate::wire::{Frame, MavId, Target};
 
 /// A system whose autopilot was not heard for so long is not taken for a vehicle any more.
 const VEHICLE_GONE: Duration = Duration::from_secs(10);
+
+/// An autopilot silent on its own link for so long is believed on others.
+const AUTOPILOT_GONE: Duration = Duration::from_secs(5);
 
 impl Bridge {
     /// One checked frame from `from`.
@@ -40,7 +40,7 @@ impl Bridge {
             self.router.learn(now, from, source);
         }
         match frame.message_id() {
-            message::HEARTBEAT => self.handle_heartbeat(now, role, frame),
+            message::HEARTBEAT => self.handle_heartbeat(now, Place { link, channel: from }, role, frame),
             message::SYSTEM_TIME => {
                 if let Some(time) = frame.decode::<SYSTEM_TIME_DATA>() {
                     self.router.note_boot_time(now, from, source, time.time_boot_ms);
@@ -53,20 +53,37 @@ impl Bridge {
             gimbal.manager.handle_heard(now, source);
         }
         if self.autopilot == Some(source) {
-            self.vehicle.handle_frame(now, frame);
-            self.streams.handle_seen(now, frame.message_id());
+            self.handle_autopilot(now, link, role, frame);
         }
         if !ours {
-            self.handle_device(now, from, link, role, frame);
+            self.handle_device(now, Place { link, channel: from }, role, frame);
         }
         self.handle_for_us(now, from, frame);
-        self.forward(now, from, link, frame);
+        self.forward(now, Place { link, channel: from }, role, frame);
     }
 
-    fn handle_heartbeat(&mut self, now: Timestamp, role: Role, frame: &Frame<'_>) {
+    /// What our autopilot says, where it is to be believed.
+    fn handle_autopilot(&mut self, now: Timestamp, link: LinkIndex, role: Role, frame: &Frame<'_>) {
+        if role != Role::Ground {
+            self.autopilot_heard = Some(now);
+        } else if self.autopilot_heard.is_some_and(|at| now.since(at) < AUTOPILOT_GONE) {
+            // Another vehicle of the same id, whose attitude would turn our camera.
+            if frame.message_id() == message::HEARTBEAT {
+                self.conflicts.note(now, Conflict::AutopilotTwice { autopilot: frame.source(), other_on: link });
+            }
+            return;
+        }
+        self.vehicle.handle_frame(now, frame);
+        self.streams.handle_seen(now, frame.message_id());
+    }
+
+    fn handle_heartbeat(&mut self, now: Timestamp, place: Place, role: Role, frame: &Frame<'_>) {
         let source = frame.source();
         let Some(heartbeat) = frame.decode::<HEARTBEAT_DATA>() else { return };
         self.ranks.handle_heartbeat(now, source, heartbeat.mavtype);
+        if heartbeat.mavtype == mav_type::GCS {
+            self.note_station(now, source, place);
+        }
         // "HEARTBEAT.autopilot other than INVALID" is an autopilot; but old gimbals send GENERIC there.
         let is_autopilot =
             heartbeat.autopilot != mav_autopilot::INVALID && !mav_type::NOT_A_VEHICLE.contains(&heartbeat.mavtype);
@@ -75,9 +92,12 @@ impl Bridge {
         }
         let was_known = self.is_vehicle(now, source.system);
         let known = &mut self.vehicles[usize::from(source.system)];
-        let component = known.map_or(source.component, |(component, _)| component);
-        let better = source.component == component::AUTOPILOT1;
-        *known = Some((if better { source.component } else { component }, now));
+        let is_first = source.component == component::AUTOPILOT1;
+        *known = Some(KnownVehicle {
+            component: known.filter(|_| !is_first).map_or(source.component, |known| known.component),
+            heard: now,
+            is_on_ground_only: role == Role::Ground && known.is_none_or(|known| known.is_on_ground_only),
+        });
         if role == Role::Autopilot {
             self.identity.handle_autopilot(now, source.system);
         }
@@ -96,7 +116,10 @@ impl Bridge {
             }
             return;
         }
-        let better = source.component == component::AUTOPILOT1 && self.autopilot != Some(source);
+        if !self.is_believed(role, system) {
+            return;
+        }
+        let better = is_first && self.autopilot != Some(source);
         if self.autopilot.is_none() || better {
             self.take_autopilot(now, source);
         } else if !self.vehicle.alive(now) {
@@ -104,47 +127,10 @@ impl Bridge {
         }
     }
 
-    /// Frames of gimbals: to their driver, or the first sign of a new one.
-    fn handle_device(&mut self, now: Timestamp, from: ChannelId, link: LinkIndex, role: Role, frame: &Frame<'_>) {
-        let source = frame.source();
-        if let Some(gimbal) = self.roster.of_device(source) {
-            if gimbal.channel != Some(from) && gimbal.manager.state() == DeviceState::Lost {
-                gimbal.channel = Some(from);
-            }
-            if gimbal.channel == Some(from) {
-                gimbal.driver.handle_received(now, frame);
-            } else if frame.message_id() == message::HEARTBEAT {
-                self.conflicts.note(now, Conflict::DeviceElsewhere { device: source });
-            }
-            return;
-        }
-        let Some(system) = self.identity.system() else { return };
-        let believed = role == Role::Gimbal || source.system == system;
-        if !believed || self.autopilot == Some(source) || source.system == 0 || source.component == 0 {
-            return;
-        }
-        let is_gimbal = match frame.message_id() {
-            message::HEARTBEAT => {
-                frame.decode::<HEARTBEAT_DATA>().is_some_and(|heartbeat| heartbeat.mavtype == mav_type::GIMBAL)
-            }
-            message::GIMBAL_DEVICE_INFORMATION => {
-                frame.decode::<GIMBAL_DEVICE_INFORMATION_DATA>().is_some_and(|device| device.gimbal_device_id == 0)
-            }
-            message::GIMBAL_DEVICE_ATTITUDE_STATUS => {
-                frame.decode::<GIMBAL_DEVICE_ATTITUDE_STATUS_DATA>().is_some_and(|device| device.gimbal_device_id == 0)
-            }
-            _ => false,
-        };
-        // The ids below 7 belong to gimbals without MAVLink, and 1 to autopilots.
-        if !is_gimbal || source.component < 7 {
-            return;
-        }
-        if source.system != system {
-            self.conflicts.note(now, Conflict::ForeignSystem { device: source, system });
-        }
-        match self.roster.adopt(now, source, link, from) {
-            Ok(gimbal) => gimbal.driver.handle_received(now, frame),
-            Err(_) => self.conflicts.note(now, Conflict::NoManagerLeft { device: source }),
+    fn note_station(&mut self, now: Timestamp, station: MavId, place: Place) {
+        let Some(other) = self.stations.handle_heartbeat(now, station, place.channel) else { return };
+        if let Some((other_link, _)) = self.channels.link_of(other) {
+            self.conflicts.note(now, Conflict::StationTwice { station, links: [place.link, other_link] });
         }
     }
 
@@ -197,7 +183,7 @@ impl Bridge {
             && command_number(frame).is_some_and(|number| WORTH_HEARING.contains(&number))
     }
 
-    fn forward(&mut self, now: Timestamp, from: ChannelId, link: LinkIndex, frame: &Frame<'_>) {
+    fn forward(&mut self, now: Timestamp, Place { link, channel: from }: Place, role: Role, frame: &Frame<'_>) {
         let verdict = self.router.route(now, from, frame.source(), frame.target());
         let mut channels = verdict.channels;
         // R14: the state of our vehicle is for every gimbal, also for one that was not heard yet.
@@ -205,7 +191,7 @@ impl Bridge {
             let known = self.router.routes().component_channels(frame.source());
             channels = channels.union(self.channels.with_role(Role::Gimbal).without(from.into()).without(known));
         }
-        channels = self.firewall(now, link, frame, channels);
+        channels = self.firewall(now, Place { link, channel: from }, role, frame, channels);
         if matches!(frame.message_id(), message::RADIO_STATUS | message::RADIO) {
             // R17: an autopilot would throttle the wrong channel by it.
             let autopilots = channels.intersection(self.channels.with_role(Role::Autopilot));
@@ -221,7 +207,12 @@ impl Bridge {
     }
 
     /// Takes `dropped` out of `channels` and counts it there.
-    fn drop_towards(&mut self, channels: ChannelSet, dropped: ChannelSet, reason: &'static str) -> ChannelSet {
+    pub(super) fn drop_towards(
+        &mut self,
+        channels: ChannelSet,
+        dropped: ChannelSet,
+        reason: &'static str,
+    ) -> ChannelSet {
         for channel in dropped {
             self.count_dropped_towards(channel, reason);
         }
@@ -230,11 +221,11 @@ impl Bridge {
 
     /// Whether an autopilot of that system was heard lately.
     fn is_vehicle(&self, now: Timestamp, system: u8) -> bool {
-        self.vehicles[usize::from(system)].is_some_and(|(_, heard)| now.since(heard) < VEHICLE_GONE)
+        self.vehicles[usize::from(system)].is_some_and(|known| now.since(known.heard) < VEHICLE_GONE)
     }
 
     /// D5: whether `id` is in a system that has an autopilot and is not ours.
-    fn is_other_vehicle(&self, now: Timestamp, id: MavId) -> bool {
+    pub(super) fn is_other_vehicle(&self, now: Timestamp, id: MavId) -> bool {
         Some(id.system) != self.identity.system() && self.is_vehicle(now, id.system)
     }
 
@@ -254,11 +245,12 @@ impl Bridge {
         if let Target::Component(target) = frame.target() {
             return gimbals.intersection(self.router.routes().component_channels(target));
         }
+        // A gimbal that has just been switched on would take another vehicle's system id for its own, the state of
+        // another vehicle would turn our camera, and its commands are not for us.
+        if self.is_other_vehicle(now, frame.source()) {
+            return ChannelSet::EMPTY;
+        }
         match frame.message_id() {
-            // The state of another vehicle would turn our camera.
-            message::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE if self.is_other_vehicle(now, frame.source()) => {
-                ChannelSet::EMPTY
-            }
             message::HEARTBEAT
             | message::SYSTEM_TIME
             | message::TIMESYNC
@@ -280,71 +272,11 @@ impl Bridge {
     }
 
     /// Where the managed devices are that `target` includes.
-    fn channels_of_devices(&self, target: Target) -> ChannelSet {
+    pub(super) fn channels_of_devices(&self, target: Target) -> ChannelSet {
         let devices = self.roster.iter().filter_map(|gimbal| gimbal.manager.device());
         devices.filter(|device| target.includes(*device)).fold(ChannelSet::EMPTY, |channels, device| {
             channels.union(self.channels_of_device(device)).union(self.router.routes().component_channels(device))
         })
-    }
-
-    /// Keeps from managed devices what others send straight to them, and on its link what a device sends as a manager.
-    fn firewall(&mut self, now: Timestamp, link: LinkIndex, frame: &Frame<'_>, mut channels: ChannelSet) -> ChannelSet {
-        let source = frame.source();
-        match frame.message_id() {
-            message::GIMBAL_MANAGER_INFORMATION | message::GIMBAL_MANAGER_STATUS => {
-                // R16: clients would see a second manager of the same gimbal.
-                if self.roster.is_device(source) {
-                    self.conflicts.note(now, Conflict::DeviceActsAsManager { device: source });
-                    self.count_dropped(link, "device_manager_message");
-                    return ChannelSet::EMPTY;
-                }
-                self.note_rival_manager(now, frame);
-            }
-            message::GIMBAL_DEVICE_SET_ATTITUDE => channels = self.keep_from_devices(now, frame, channels),
-            message::COMMAND_LONG | message::COMMAND_INT if is_mount_command(frame) => {
-                channels = self.keep_from_devices(now, frame, channels);
-            }
-            _ => {}
-        }
-        channels
-    }
-
-    /// R15: on our gimbals we are the only party that says where to look.
-    fn keep_from_devices(&mut self, now: Timestamp, frame: &Frame<'_>, channels: ChannelSet) -> ChannelSet {
-        let kept_away = self.settings.control.firewall == Firewall::On;
-        let rival = frame.source();
-        let autopilot = self.autopilot.filter(|known| *known == rival).and(self.vehicle.autopilot());
-        let devices = self.roster.iter().filter_map(|gimbal| gimbal.manager.device());
-        for device in devices.filter(|device| frame.target().includes(*device)) {
-            self.conflicts.note(now, Conflict::RivalMaster { rival, device, autopilot, kept_away });
-        }
-        if !kept_away {
-            return channels;
-        }
-        // On a gimbal's own link also before the device there is known to us.
-        let guarded = self.channels_of_devices(frame.target()).union(self.channels.with_role(Role::Gimbal));
-        let guarded = channels.intersection(guarded);
-        self.drop_towards(channels, guarded, "firewall")
-    }
-
-    fn note_rival_manager(&mut self, now: Timestamp, frame: &Frame<'_>) {
-        let rival = frame.source();
-        if Some(rival.system) != self.identity.system() || self.is_own_id(rival) {
-            return;
-        }
-        let device_id = match frame.message_id() {
-            message::GIMBAL_MANAGER_INFORMATION => {
-                frame.decode::<GIMBAL_MANAGER_INFORMATION_DATA>().map(|message| message.gimbal_device_id)
-            }
-            _ => frame.decode::<GIMBAL_MANAGER_STATUS_DATA>().map(|message| message.gimbal_device_id),
-        };
-        let is_autopilot = self.autopilot == Some(rival);
-        let same_device =
-            self.roster.iter().any(|gimbal| device_id.is_some() && gimbal.manager.device_id() == device_id);
-        if is_autopilot || same_device {
-            let autopilot = self.autopilot.filter(|_| is_autopilot).and(self.vehicle.autopilot());
-            self.conflicts.note(now, Conflict::RivalManager { rival, autopilot });
-        }
     }
 }
 
@@ -357,11 +289,4 @@ pub(super) fn command_number(frame: &Frame<'_>) -> Option<u16> {
         }
         _ => None,
     }
-}
-
-fn is_mount_command(frame: &Frame<'_>) -> bool {
-    matches!(
-        command_number(frame),
-        Some(command::DO_MOUNT_CONFIGURE | command::DO_MOUNT_CONTROL | command::DO_MOUNT_CONTROL_QUAT)
-    )
 }

@@ -34,8 +34,8 @@ impl Bridge {
                 .filter(|gimbal| gimbal.configured || gimbal.manager.device().is_some())
                 .map(|gimbal| self.gimbal_snapshot(now, gimbal))
                 .collect(),
-            conflicts: self.conflicts.current(now).map(|conflict| conflict.describe()).collect(),
             events: self.events.snapshot(now, self.started),
+            conflicts: self.conflicts.descriptions(now).collect(),
         }
     }
 

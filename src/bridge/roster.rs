@@ -2,6 +2,12 @@
 //!
 //! One component per gimbal: device 154 has manager 191, 171 has 192, 172 has 193, 173 has 194; other gimbals take the
 //! free ones in the order of the configuration.
+//!
+//! Which device belongs to which of them is decided in [`adoption`].
+
+mod adoption;
+
+pub use adoption::{Hearing, NotAdopted, Place, Renamed};
 
 use super::LinkIndex;
 use super::settings::Settings;
@@ -10,7 +16,7 @@ use crate::gimbals::mavlink_v2::MavlinkV2Driver;
 use crate::gimbals::settings::GimbalSettings;
 use crate::gimbals::{DriverOutput, GimbalDriver};
 use crate::manager::settings::ControlSettings;
-use crate::manager::{DeviceState, GimbalManager, ManagerOutput};
+use crate::manager::{GimbalManager, ManagerOutput};
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 use crate::wire::ids::component;
@@ -24,6 +30,15 @@ pub struct Gimbal {
     pub adopted: Option<MavId>,
     /// Where that one is; others under its id elsewhere are not it. `None` while its channel is closed.
     pub channel: Option<ChannelId>,
+    /// The link of that channel, also after it was closed.
+    link: LinkIndex,
+    adopted_at: Timestamp,
+    /// When it was last heard there.
+    heard: Timestamp,
+    /// Where its id was heard besides since then.
+    elsewhere: Option<LinkIndex>,
+    /// When it turned out that two speak under its id.
+    has_twin: Option<Timestamp>,
     /// The manager's component id.
     pub component: u8,
     /// It has an entry in the configuration, and is missed when it is not there.
@@ -37,8 +52,22 @@ impl Gimbal {
             driver: Box::new(MavlinkV2Driver::new()),
             adopted: None,
             channel: None,
+            link: 0,
+            adopted_at: Timestamp::ZERO,
+            heard: Timestamp::ZERO,
+            elsewhere: None,
+            has_twin: None,
             component,
             configured,
+        }
+    }
+
+    /// What it was told and what it said is forgotten, and it is looked for as in the beginning.
+    fn start_over(&mut self, rules: &ControlSettings, open: ChannelSet, now: Timestamp) {
+        let settings = self.manager.settings().clone();
+        *self = Self::new(settings, rules, self.component, self.configured);
+        for channel in open {
+            self.manager.open_channel(now, channel);
         }
     }
 
@@ -73,15 +102,21 @@ pub struct Roster {
     rules: ControlSettings,
     /// The channels that are open, for the manager of a gimbal that is found later.
     open: ChannelSet,
+    /// Devices that are not adopted yet, and when each was first heard.
+    waiting: Vec<(MavId, Timestamp)>,
+    /// Components of type gimbal that manage a gimbal without MAVLink.
+    self_managed: Vec<MavId>,
 }
-
-/// No component id is left for the manager of another gimbal.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct NoManagerLeft;
 
 impl Roster {
     pub fn new(settings: &Settings) -> Self {
-        let mut roster = Self { gimbals: Vec::new(), rules: settings.control.clone(), open: ChannelSet::EMPTY };
+        let mut roster = Self {
+            gimbals: Vec::new(),
+            rules: settings.control.clone(),
+            open: ChannelSet::EMPTY,
+            waiting: Vec::new(),
+            self_managed: Vec::new(),
+        };
         let mut wanted: Vec<Option<u8>> = settings
             .gimbals
             .iter()
@@ -137,9 +172,10 @@ impl Roster {
         }
     }
 
-    /// The gimbal whose device that is.
-    pub fn of_device(&mut self, device: MavId) -> Option<&mut Gimbal> {
-        self.gimbals.iter_mut().find(|gimbal| gimbal.adopted == Some(device))
+    /// Whether another than the managed device speaks under its id on `channel`.
+    pub fn is_twin(&self, device: MavId, channel: ChannelId) -> bool {
+        let gimbal = self.gimbals.iter().find(|gimbal| gimbal.adopted == Some(device));
+        gimbal.is_some_and(|gimbal| gimbal.channel.is_some_and(|place| place != channel) && !gimbal.is_lost())
     }
 
     /// The gimbal whose manager that component of ours is.
@@ -162,63 +198,30 @@ impl Roster {
         self.gimbals.iter().any(|gimbal| gimbal.component == component)
     }
 
-    /// The gimbal for a device heard on a channel of `link`, which is given to its driver; new ones are made as they
-    /// are needed.
-    pub fn adopt(
-        &mut self,
-        now: Timestamp,
-        device: MavId,
-        link: LinkIndex,
-        channel: ChannelId,
-    ) -> Result<&mut Gimbal, NoManagerLeft> {
-        let at = match self.place_for(device, link, channel) {
-            Some(at) => at,
-            None => self.make_place(now, device)?,
-        };
-        let gimbal = &mut self.gimbals[at];
-        gimbal.driver.adopt(now, device);
-        gimbal.adopted = Some(device);
-        gimbal.channel = Some(channel);
-        Ok(gimbal)
-    }
-
-    fn place_for(&self, device: MavId, link: LinkIndex, channel: ChannelId) -> Option<usize> {
-        let fits = |gimbal: &Gimbal| {
-            // A device with another system id is the one we had, if it speaks from the same place or that one is lost.
-            let free = gimbal.adopted.is_none_or(|known| {
-                let gone = gimbal.manager.state() == DeviceState::Lost || gimbal.channel == Some(channel);
-                known.component == device.component && gone
-            });
-            free && gimbal.manager.settings().link.is_none_or(|wanted| wanted == link)
-        };
-        let named = |gimbal: &Gimbal| gimbal.manager.settings().component_id == Some(device.component);
-        let unnamed = |gimbal: &Gimbal| gimbal.configured && gimbal.manager.settings().component_id.is_none();
-        let found = |gimbal: &Gimbal| {
-            let again = gimbal.adopted.is_some_and(|known| known.component == device.component);
-            !gimbal.configured && (again || manager_of_device(device.component) == Some(gimbal.component))
-        };
-        let position =
-            |wanted: &dyn Fn(&Gimbal) -> bool| self.gimbals.iter().position(|gimbal| fits(gimbal) && wanted(gimbal));
-        position(&named).or_else(|| position(&unnamed)).or_else(|| position(&found))
-    }
-
-    /// A new gimbal, in the place of one that was only found and is lost when no manager is left.
-    fn make_place(&mut self, now: Timestamp, device: MavId) -> Result<usize, NoManagerLeft> {
-        let lost = |gimbal: &Gimbal| !gimbal.configured && gimbal.manager.state() == DeviceState::Lost;
+    /// A new gimbal, in the place of one that was only found and is lost for good when no manager is left.
+    fn make_place(&mut self, now: Timestamp, device: MavId, ours: u8) -> Result<usize, NotAdopted> {
+        let given_up = |gimbal: &Gimbal| !gimbal.configured && gimbal.is_lost_for_good(now);
         let (at, component) = match self.free_manager(device) {
             Some(component) => (self.gimbals.len(), component),
             None => {
-                let at = self.gimbals.iter().position(lost).ok_or(NoManagerLeft)?;
+                let at = self.gimbals.iter().position(given_up).ok_or(NotAdopted::NoManagerLeft)?;
                 (at, self.gimbals.remove(at).component)
             }
         };
-        let settings = GimbalSettings::found(format!("gimbal-{}", device.component));
+        let settings = GimbalSettings::found(self.free_name(device, ours));
         let mut gimbal = Gimbal::new(settings, &self.rules, component, false);
         for channel in self.open {
             gimbal.manager.open_channel(now, channel);
         }
         self.gimbals.insert(at, gimbal);
         Ok(at)
+    }
+
+    /// A name that no gimbal has: by the component, with the system where that is not the vehicle's.
+    fn free_name(&self, device: MavId, ours: u8) -> String {
+        let plain = format!("gimbal-{}", device.component);
+        let is_taken = self.gimbals.iter().any(|gimbal| gimbal.manager.settings().name == plain);
+        if is_taken || device.system != ours { format!("gimbal-{}-{}", device.system, device.component) } else { plain }
     }
 
     /// The manager component for a device without an entry.
@@ -270,7 +273,7 @@ mod tests {
         let channel = ChannelId::new(0).expect("below the bound");
         let component = |roster: &mut Roster, device: u8| {
             let device = MavId::new(1, device);
-            roster.adopt(Timestamp::ZERO, device, 0, channel).map(|gimbal| gimbal.component)
+            roster.adopt(Timestamp::ZERO, device, Place { link: 0, channel }, 1).map(|gimbal| gimbal.component)
         };
         assert_eq!(component(&mut roster, 171), Ok(192));
         assert_eq!(component(&mut roster, 154), Ok(191));

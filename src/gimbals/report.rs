@@ -29,6 +29,8 @@ pub struct Identity {
     pub custom_name: String,
     /// Major, minor, patch, development.
     pub firmware: Option<[u8; 4]>,
+    /// The number of this one device among all, where it has one.
+    pub uid: Option<u64>,
 }
 
 /// The device's attitude and state (`GIMBAL_DEVICE_ATTITUDE_STATUS` or its equivalent).

@@ -3,6 +3,7 @@
 mod autopilot_state;
 mod codec;
 mod discovery;
+mod gimbals;
 mod identity;
 mod manager;
 mod mavsdk_trace;

@@ -57,6 +57,7 @@ pub fn read_information(frame: &Frame<'_>) -> Option<DeviceInformation> {
             model: text(&message.model_name),
             custom_name: text(&message.custom_name),
             firmware: (message.firmware_version != 0).then(|| message.firmware_version.to_le_bytes()),
+            uid: (message.uid != 0).then_some(message.uid),
         },
         capabilities: Capabilities { flags, limits },
         gimbal_device_id: message.gimbal_device_id,

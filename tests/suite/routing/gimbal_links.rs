@@ -137,3 +137,25 @@ fn item_127_a_region_of_interest_for_the_device_is_not_ours() {
     }
     assert_eq!(rig.world.snapshot().gimbals[0].roi, None);
 }
+
+/// "never a wrong id": a gimbal that has just been switched on takes the system id of an autopilot that it hears, and
+/// that must not be another vehicle's. Nor are their commands for it, such as PX4's request of 283 of everybody.
+#[test]
+fn d14_what_other_vehicles_say_to_all_is_not_for_our_gimbal() {
+    let mut rig = rig();
+    rig.introduce("autopilot", AUTOPILOT);
+    let beat = frame(OTHER_AUTOPILOT, HEARTBEAT, &[0, 0, 0, 0, 2, 12, 0, 4, 3]);
+    assert_eq!(rig.deliver("ground", &beat), ["autopilot", "radio", "peer"]);
+    for id in [SYSTEM_TIME, COMMAND_LONG, 21, 111] {
+        let shape = message_shape(id).expect("a known message");
+        let bytes = |source, target| match shape.system_offset {
+            Some(_) => addressed(source, id, target),
+            None => broadcast(source, id),
+        };
+        assert!(!rig.deliver("ground", &bytes(OTHER_AUTOPILOT, (0, 0))).contains(&"gimbal"), "{}", shape.name);
+        assert!(!rig.deliver("ground", &bytes(MavId::new(9, 154), (0, 0))).contains(&"gimbal"), "{}", shape.name);
+        assert!(rig.deliver_amid_ours("autopilot", &bytes(AUTOPILOT, (0, 0))).contains(&"gimbal"), "{}", shape.name);
+    }
+    // What is addressed to it is delivered.
+    assert_eq!(rig.deliver("ground", &addressed(OTHER_AUTOPILOT, MISSION_REQUEST_LIST, (1, 154))), ["gimbal"]);
+}

@@ -1,0 +1,246 @@
+//! Which device is which gimbal's.
+//!
+//! A gimbal is one device at one place. Its place is taken by another only when it is lost, so two that claim the same
+//! never alternate: the one that was there first stays. A device that was restarted under another id is the same one;
+//! it is told from a second one by the silence under the first id.
+
+use std::time::Duration;
+
+use super::{Gimbal, Roster, manager_of_device};
+use crate::bridge::LinkIndex;
+use crate::channel::ChannelId;
+use crate::manager::DeviceState;
+use crate::timestamp::Timestamp;
+use crate::wire::MavId;
+
+/// A device silent for so long is lost for good: another under its id may take its place, and its manager's component
+/// id may serve another gimbal.
+const GONE_FOR_GOOD: Duration = Duration::from_secs(10);
+
+/// Two devices under one id are remembered for so long.
+const TWIN_REMEMBERED: Duration = Duration::from_secs(60);
+
+/// So many devices wait at most until it is clear whether they are new or a known one under another id.
+const MAX_WAITING: usize = 16;
+
+/// So many components are remembered that manage a gimbal of their own.
+const MAX_SELF_MANAGED: usize = 16;
+
+/// Where a frame came in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place {
+    pub link: LinkIndex,
+    pub channel: ChannelId,
+}
+
+/// What a frame under the id of a device means.
+#[derive(Debug)]
+pub enum Hearing<'a> {
+    /// It is of the device of this gimbal; another spoke under its id on link `twin` since it was last heard.
+    Device { gimbal: &'a mut Gimbal, twin: Option<LinkIndex> },
+    /// Another one has the id of a device of ours.
+    Elsewhere,
+    /// It has the id of a device of ours, but its entry names another link.
+    OffItsLink,
+    /// No gimbal of ours has that device.
+    Unknown,
+}
+
+/// Why a device is not managed, for the time being or at all.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NotAdopted {
+    /// It is not clear yet whether it is new or one that we know under another component id.
+    Waits,
+    /// No component id is left for the manager of another gimbal.
+    NoManagerLeft,
+}
+
+/// A device that has another component id than before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Renamed {
+    pub former: MavId,
+    pub device: MavId,
+}
+
+impl Gimbal {
+    pub(super) fn is_lost(&self) -> bool {
+        self.manager.state() == DeviceState::Lost
+    }
+
+    /// Whether nobody waits for its device to come back.
+    pub(super) fn is_lost_for_good(&self, now: Timestamp) -> bool {
+        self.is_lost() && now.since(self.heard) >= GONE_FOR_GOOD
+    }
+
+    /// Whether its device may be on that link.
+    fn may_be_on(&self, link: LinkIndex) -> bool {
+        self.manager.settings().link.is_none_or(|wanted| wanted == link)
+    }
+
+    /// Whether nothing that a v2 device says of itself was heard, but its heartbeat.
+    fn is_only_a_heartbeat(&self) -> bool {
+        self.adopted.is_some() && !self.manager.is_known() && self.manager.status().is_none()
+    }
+}
+
+impl Roster {
+    /// What a frame of a managed device means that came in at `place`.
+    pub fn hear(&mut self, now: Timestamp, device: MavId, place: Place, is_sign_of_life: bool) -> Hearing<'_> {
+        let Some(gimbal) = self.gimbals.iter_mut().find(|gimbal| gimbal.adopted == Some(device)) else {
+            return Hearing::Unknown;
+        };
+        if gimbal.channel == Some(place.channel) {
+            gimbal.heard = now;
+            let twin = gimbal.elsewhere.take();
+            if twin.is_some() {
+                gimbal.has_twin = Some(now);
+            }
+            return Hearing::Device { gimbal, twin };
+        }
+        if !gimbal.may_be_on(place.link) {
+            return Hearing::OffItsLink;
+        }
+        let twin_was_heard = gimbal.has_twin.is_some_and(|at| now.since(at) < TWIN_REMEMBERED);
+        let is_free = if twin_was_heard { gimbal.is_lost_for_good(now) } else { gimbal.is_lost() };
+        if !(is_free && is_sign_of_life) {
+            gimbal.elsewhere = Some(place.link);
+            return Hearing::Elsewhere;
+        }
+        tracing::info!(%device, "gimbal moved");
+        gimbal.channel = Some(place.channel);
+        (gimbal.link, gimbal.heard) = (place.link, now);
+        (gimbal.elsewhere, gimbal.has_twin) = (None, None);
+        Hearing::Device { gimbal, twin: None }
+    }
+
+    /// The gimbal for a device that was heard for the first time, which is given to its driver; new ones are made as they
+    /// are needed. `ours` is the system id of the vehicle.
+    pub fn adopt(&mut self, now: Timestamp, device: MavId, place: Place, ours: u8) -> Result<&mut Gimbal, NotAdopted> {
+        let at = match self.place_for(now, device, place, ours)? {
+            Some(at) => at,
+            None => self.make_place(now, device, ours)?,
+        };
+        self.waiting.retain(|(waiting, _)| *waiting != device);
+        let gimbal = &mut self.gimbals[at];
+        gimbal.driver.adopt(now, device);
+        gimbal.adopted = Some(device);
+        gimbal.channel = Some(place.channel);
+        (gimbal.link, gimbal.adopted_at, gimbal.heard) = (place.link, now, now);
+        (gimbal.elsewhere, gimbal.has_twin) = (None, None);
+        Ok(gimbal)
+    }
+
+    /// Whether `id` manages a gimbal of its own, which is none of ours.
+    pub fn is_self_managed(&self, id: MavId) -> bool {
+        self.self_managed.contains(&id)
+    }
+
+    /// `id` was taken for a gimbal because of its heartbeat, but what it says of a gimbal is about one of its own.
+    pub fn note_self_managed(&mut self, now: Timestamp, id: MavId) {
+        if self.is_self_managed(id) {
+            return;
+        }
+        let Some(at) = self.gimbals.iter().position(|gimbal| gimbal.adopted == Some(id)) else { return };
+        if self.gimbals[at].is_only_a_heartbeat() {
+            tracing::info!(%id, "no gimbal, but the manager of one of its own");
+            if self.self_managed.len() >= MAX_SELF_MANAGED {
+                self.self_managed.remove(0);
+            }
+            self.self_managed.push(id);
+            self.dismiss(now, at);
+        }
+    }
+
+    /// Devices that were lost and speak under another component id now: their former place is given up, but for those
+    /// with an entry that names the component, which are told of.
+    pub fn give_up_renamed(&mut self, now: Timestamp) -> Vec<Renamed> {
+        let mut told = Vec::new();
+        for at in 0..self.gimbals.len() {
+            let former = &self.gimbals[at];
+            let (Some(id), Some(uid)) = (former.adopted, former.manager.identity().uid) else { continue };
+            let is_it = |gimbal: &&Gimbal| {
+                gimbal.manager.state() == DeviceState::Alive
+                    && gimbal.manager.identity().uid == Some(uid)
+                    && gimbal.link == former.link
+                    && gimbal.adopted_at > former.heard
+            };
+            let Some(device) = self.gimbals.iter().find(is_it).and_then(|gimbal| gimbal.adopted) else { continue };
+            if !former.is_lost() {
+                continue;
+            }
+            if former.configured {
+                told.push(Renamed { former: id, device });
+            } else {
+                tracing::info!(former = %id, %device, "gimbal has another component id");
+                self.dismiss(now, at);
+            }
+        }
+        told
+    }
+
+    /// Takes a gimbal's device from it; its manager waits for the next one.
+    fn dismiss(&mut self, now: Timestamp, at: usize) {
+        let (open, rules) = (self.open, self.rules.clone());
+        self.gimbals[at].start_over(&rules, open, now);
+    }
+
+    /// The gimbal that a device unknown so far belongs to.
+    fn place_for(
+        &mut self,
+        now: Timestamp,
+        device: MavId,
+        place: Place,
+        ours: u8,
+    ) -> Result<Option<usize>, NotAdopted> {
+        let fits = |gimbal: &Gimbal| {
+            let free = gimbal.adopted.is_none_or(|known| {
+                // A device that takes the vehicle's system id is the one we had.
+                let came_home = gimbal.channel == Some(place.channel) && device.system == ours && known.system != ours;
+                known.component == device.component && (came_home || gimbal.is_lost())
+            });
+            free && gimbal.may_be_on(place.link)
+        };
+        let is_named = |gimbal: &Gimbal| gimbal.manager.settings().component_id.is_some();
+        let named = |gimbal: &Gimbal| gimbal.manager.settings().component_id == Some(device.component);
+        let unnamed = |gimbal: &Gimbal| gimbal.configured && !is_named(gimbal);
+        let found = |gimbal: &Gimbal| {
+            let again = gimbal.adopted.is_some_and(|known| known.component == device.component);
+            !gimbal.configured && (again || manager_of_device(device.component) == Some(gimbal.component))
+        };
+        let position =
+            |wanted: &dyn Fn(&Gimbal) -> bool| self.gimbals.iter().position(|gimbal| fits(gimbal) && wanted(gimbal));
+        if let Some(at) = position(&named).or_else(|| position(&unnamed)) {
+            return Ok(Some(at));
+        }
+        // It may be one that we know under another id, which is silent from now on. If that one goes on speaking, they
+        // are two.
+        let may_be_it = |gimbal: &Gimbal| {
+            let same_line = unnamed(gimbal) && gimbal.channel == Some(place.channel);
+            gimbal.adopted.is_some_and(|known| known.component == device.component || same_line)
+        };
+        if let Some(at) = self.gimbals.iter().position(|gimbal| may_be_it(gimbal) && gimbal.may_be_on(place.link)) {
+            let since = self.waiting_since(now, device);
+            let gimbal = &self.gimbals[at];
+            if gimbal.is_lost() {
+                return Ok(Some(at));
+            }
+            if gimbal.heard <= since {
+                return Err(NotAdopted::Waits);
+            }
+        }
+        let position = self.gimbals.iter().position(|gimbal| fits(gimbal) && found(gimbal));
+        Ok(position)
+    }
+
+    /// When `device` was first heard.
+    fn waiting_since(&mut self, now: Timestamp, device: MavId) -> Timestamp {
+        if let Some((_, since)) = self.waiting.iter().find(|(known, _)| *known == device) {
+            return *since;
+        }
+        if self.waiting.len() >= MAX_WAITING {
+            self.waiting.remove(0);
+        }
+        self.waiting.push((device, now));
+        now
+    }
+}
