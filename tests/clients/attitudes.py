@@ -1,5 +1,6 @@
 """What a client sees of the camera's attitude, and when it saw it."""
 
+import math
 import threading
 import time
 from collections import deque
@@ -15,6 +16,38 @@ class Seen(NamedTuple):
     pitch: float
     yaw_vehicle: float
     yaw_north: float
+    roll: float
+
+
+# Of GIMBAL_DEVICE_ATTITUDE_STATUS: yaw is from North.
+YAW_IN_EARTH_FRAME = 64
+
+
+def angles_of(q):
+    """Roll, pitch and yaw in degrees of w, x, y, z."""
+    w, x, y, z = q
+    roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    pitch = math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x))))
+    yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    return math.degrees(roll), math.degrees(pitch), math.degrees(yaw)
+
+
+def wrapped(angle):
+    """From -180 to 180 degrees."""
+    return (angle + 180) % 360 - 180
+
+
+def slope(seen, axis):
+    """How fast `axis` turned, degrees per second."""
+    # The slope of the line nearest to all of them: one late arrival does not matter.
+    mean_time = sum(one.time for one in seen) / len(seen)
+    turned, total = [0.0], 0.0
+    for before, after in zip(seen, seen[1:]):
+        total += wrapped(getattr(after, axis) - getattr(before, axis))
+        turned.append(total)
+    mean_turned = sum(turned) / len(turned)
+    spread = sum((one.time - mean_time) ** 2 for one in seen)
+    return sum((one.time - mean_time) * (angle - mean_turned) for one, angle in zip(seen, turned)) / spread
 
 
 class Attitudes:
@@ -24,13 +57,27 @@ class Attitudes:
         self._lock = threading.Lock()
         self._seen = deque(maxlen=2000)
 
-    def add(self, pitch, yaw_vehicle=None, yaw_north=None):
+    def add(self, pitch, yaw_vehicle=None, yaw_north=None, roll=None):
         with self._lock:
-            self._seen.append(Seen(time.monotonic(), pitch, yaw_vehicle, yaw_north))
+            self._seen.append(Seen(time.monotonic(), pitch, yaw_vehicle, yaw_north, roll))
+
+    def add_status(self, message):
+        """A GIMBAL_DEVICE_ATTITUDE_STATUS."""
+        roll, pitch, yaw = angles_of(message.q)
+        heading = math.degrees(message.delta_yaw)
+        if message.flags & YAW_IN_EARTH_FRAME:
+            self.add(pitch, wrapped(yaw - heading), yaw, roll)
+        else:
+            self.add(pitch, yaw, wrapped(yaw + heading), roll)
 
     def since(self, moment):
         with self._lock:
             return [seen for seen in self._seen if seen.time >= moment]
+
+    def last(self):
+        """The newest; there has to be one."""
+        with self._lock:
+            return self._seen[-1]
 
     def wait_at(self, timeout=6, steady=5, within=1.0, **wanted):
         """Waits until the last few are all at the wanted angles; gives the last one."""
@@ -53,6 +100,13 @@ class Attitudes:
         wait_for(missing, arrived, timeout)
         return last()[-1]
 
+    def expect_still(self, seconds, within=1.0, **wanted):
+        """Fails if the camera leaves these angles within so many seconds from now."""
+        for seen in self.watch(seconds):
+            for axis, angle in wanted.items():
+                if angle_between(getattr(seen, axis), angle) > within:
+                    raise Failure(f"the camera moved from {wanted}: {seen}")
+
     def watch(self, seconds):
         """What arrives from now on for so long."""
         started = time.monotonic()
@@ -63,20 +117,15 @@ class Attitudes:
         )
         return self.since(started)
 
-    def rate(self, axis, seconds=2.0):
-        """How fast `axis` turns, degrees per second, over so long from now on."""
+    def rates(self, axes, seconds=2.0):
+        """How fast each of the `axes` turns, degrees per second, over so long from now on."""
         seen = self.watch(seconds)
         if len(seen) < 5:
             raise Failure(f"only {len(seen)} attitudes in {seconds} s")
-        # The slope of the line nearest to all of them: one late arrival does not matter.
-        mean_time = sum(one.time for one in seen) / len(seen)
-        turned, total = [0.0], 0.0
-        for before, after in zip(seen, seen[1:]):
-            total += (getattr(after, axis) - getattr(before, axis) + 180) % 360 - 180
-            turned.append(total)
-        mean_turned = sum(turned) / len(turned)
-        spread = sum((one.time - mean_time) ** 2 for one in seen)
-        return sum((one.time - mean_time) * (angle - mean_turned) for one, angle in zip(seen, turned)) / spread
+        return [slope(seen, axis) for axis in axes]
+
+    def rate(self, axis, seconds=2.0):
+        return self.rates([axis], seconds)[0]
 
     def wait_still(self, axis, timeout=6):
         """Waits until `axis` has stopped turning."""

@@ -9,21 +9,16 @@ Each block of its steps begins with the camera ahead, so that several gimbals ca
 
 import concurrent.futures
 import math
-import os
 import threading
 import time
 
-os.environ["MAVLINK20"] = "1"
-os.environ["MAVLINK_DIALECT"] = "all"
+import pymavlink
 
-import pymavlink  # noqa: E402
-from pymavlink import mavutil  # noqa: E402  (reads the dialect from the environment)
-
-from ground import FOLLOW, LOCK, NAN, YAW_IN_EARTH_FRAME, YAW_IN_VEHICLE_FRAME, pitch_and_yaw, quaternion  # noqa: E402
-from rig import GIMBALD, LOGS, Process, free_port  # noqa: E402
-from steps import Steps, angle_between, expect, wait_for  # noqa: E402
-
-mavlink = mavutil.mavlink
+from attitudes import angles_of
+from dialect import mavlink, mavutil
+from ground import FOLLOW, LOCK, NAN, YAW_IN_EARTH_FRAME, YAW_IN_VEHICLE_FRAME, quaternion
+from rig import GIMBALD, LOGS, Process, free_port
+from steps import Steps, angle_between, expect, wait_for
 
 ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
 INFORMATION = mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_INFORMATION
@@ -132,7 +127,7 @@ class Tester:
 
     def attitudes(self, since=0.0):
         """Pitch and yaw of what was reported, as counted from North whatever the flags say."""
-        return [pitch_and_yaw(message.q) for _, message in self.heard("GIMBAL_DEVICE_ATTITUDE_STATUS", since)]
+        return [angles_of(message.q)[1:] for _, message in self.heard("GIMBAL_DEVICE_ATTITUDE_STATUS", since)]
 
     def steer(self, flags, q=(NAN,) * 4, rates=(NAN,) * 3):
         """Rates about roll, pitch and yaw in degrees per second."""
@@ -317,7 +312,7 @@ class Tester:
 
             def is_there(message, wanted):
                 offset = 0 if message.flags & YAW_IN_EARTH_FRAME else math.degrees(message.delta_yaw)
-                return angle_between(pitch_and_yaw(message.q)[1] + offset, wanted) < 1.0
+                return angle_between(angles_of(message.q)[1:][1] + offset, wanted) < 1.0
 
             status = wait_for(f"yaw {wanted}° from North", arrived, PATIENCE)
             said = status.flags & (YAW_IN_VEHICLE_FRAME | YAW_IN_EARTH_FRAME)

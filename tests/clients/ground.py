@@ -1,20 +1,14 @@
 """A small ground station on pymavlink, for scripts that speak raw MAVLink."""
 
 import math
-import os
 import threading
 import time
 from collections import defaultdict
 
-os.environ["MAVLINK20"] = "1"
-os.environ["MAVLINK_DIALECT"] = "all"
+from attitudes import Attitudes
+from dialect import mavlink, mavutil
+from steps import Failure, expect, wait_for
 
-from pymavlink import mavutil  # noqa: E402  (reads the dialect from the environment)
-
-from attitudes import Attitudes  # noqa: E402
-from steps import Failure, expect, wait_for  # noqa: E402
-
-mavlink = mavutil.mavlink
 NAN = math.nan
 
 # Flags of setpoints.
@@ -33,14 +27,6 @@ def quaternion(pitch_deg, yaw_deg):
         math.cos(y) * math.sin(p),
         math.sin(y) * math.cos(p),
     ]
-
-
-def pitch_and_yaw(q):
-    """Degrees."""
-    w, x, y, z = q
-    pitch = math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x))))
-    yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    return math.degrees(pitch), math.degrees(yaw)
 
 
 class GroundStation:
@@ -90,12 +76,7 @@ class GroundStation:
             self._messages[message.get_type()].append((time.monotonic(), message))
         from_device = (message.get_srcSystem(), message.get_srcComponent()) == (self._vehicle, self._device)
         if message.get_type() == "GIMBAL_DEVICE_ATTITUDE_STATUS" and from_device:
-            pitch, yaw = pitch_and_yaw(message.q)
-            heading = math.degrees(message.delta_yaw)
-            if message.flags & YAW_IN_EARTH_FRAME:
-                self.attitudes.add(pitch, yaw - heading, yaw)
-            else:
-                self.attitudes.add(pitch, yaw, yaw + heading)
+            self.attitudes.add_status(message)
 
     def check(self):
         expect(self._error is None, self._error)

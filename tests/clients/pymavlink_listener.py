@@ -4,13 +4,13 @@ import math
 import socket
 import threading
 import time
-from typing import NamedTuple
 
 import pymavlink
 
+from frames import Frame, decode
 from ground import FOLLOW, LOCK, NAN, YAW_IN_EARTH_FRAME, YAW_IN_VEHICLE_FRAME, GroundStation, mavlink, quaternion
 from rig import Rig
-from steps import Failure, Steps, expect, wait_for
+from steps import Steps, expect, wait_for
 
 SYSTEM_ID = 42
 DEVICE = 154
@@ -51,41 +51,6 @@ class Listener:
 
     def seen(self):
         return list(self._datagrams)
-
-
-class Frame(NamedTuple):
-    time: float
-    message: object
-
-    @property
-    def source(self):
-        return self.message.get_srcSystem(), self.message.get_srcComponent()
-
-    @property
-    def name(self):
-        return self.message.get_type()
-
-    @property
-    def bytes(self):
-        return bytes(self.message.get_msgbuf())
-
-
-def decode(chunks, whole):
-    """Every frame of the stream; with `whole`, none may go beyond its chunk."""
-    decoder = mavlink.MAVLink(None)
-    decoder.robust_parsing = False
-    frames = []
-    for at, data in chunks:
-        try:
-            messages = decoder.parse_buffer(data) or []
-        except mavlink.MAVError as error:
-            raise Failure(f"{error} in {data.hex()}") from error
-        for message in messages:
-            expect(not message.get_type().startswith(("BAD_DATA", "UNKNOWN")), f"{message} in {data.hex()}")
-            frames.append(Frame(at, message))
-        if whole:
-            expect(decoder.buf_len() == 0, f"a datagram ends within a frame: {data.hex()}")
-    return frames
 
 
 def pairwise(values):

@@ -22,7 +22,16 @@ import tty
 import urllib.error
 import urllib.request
 
+from attitudes import Attitudes
+from dialect import mavlink
+from frames import decode
 from steps import Failure, wait_for
+
+# The simulated vehicle flies a circle of 40 m around home, 50 m above it, to the right.
+HOME = (47.397742, 8.545594)
+HOME_AMSL = 488
+PITCH_TO_HOME = -51.34
+TURN_RATE_DPS = 7.16
 
 REPOSITORY = pathlib.Path(__file__).resolve().parents[2]
 GIMBALD = os.environ.get("GIMBALD", str(REPOSITORY / "target/release/gimbald"))
@@ -96,7 +105,9 @@ class Tap:
     # A minute of a serial line at full rate, several times over.
     MOST = 50_000
 
-    def __init__(self):
+    def __init__(self, hear_peer=None):
+        """`hear_peer` gets at once what the peer sends."""
+        self._hear_peer = hear_peer
         self._lock = threading.Lock()
         self._from_daemon = []
         self._from_peer = []
@@ -110,11 +121,21 @@ class Tap:
         with self._lock:
             if len(chunks) < self.MOST:
                 chunks.append((time.monotonic(), data))
+        if chunks is self._from_peer and self._hear_peer:
+            self._hear_peer(data)
 
     def seen(self):
         """What the daemon sent and what the peer sent, each a list of (time, bytes)."""
         with self._lock:
             return list(self._from_daemon), list(self._from_peer)
+
+    def daemon_said(self, since=0.0):
+        """The daemon's frames."""
+        return [frame for frame in decode(self.seen()[0], whole=False) if frame.time >= since]
+
+    def peer_said(self, since=0.0):
+        """The peer's frames."""
+        return [frame for frame in decode(self.seen()[1], whole=False) if frame.time >= since]
 
     def close(self):
         self._stop.set()
@@ -128,8 +149,8 @@ class Tap:
 class Cable(Tap):
     """Two pseudo-terminals, joined: either end opens like a serial port."""
 
-    def __init__(self):
-        super().__init__()
+    def __init__(self, hear_peer=None):
+        super().__init__(hear_peer)
         self._daemon, daemon_end = os.openpty()
         self._peer, peer_end = os.openpty()
         # Held open, so that the cable outlives whoever opens its ends.
@@ -158,31 +179,34 @@ class Cable(Tap):
 
 
 class Wire(Tap):
-    """A UDP port that passes every datagram on to the daemon, and the answers back."""
+    """A UDP path between the daemon and one peer. One of them listens on a port; the other sends to `port`."""
 
-    def __init__(self, daemon_port):
+    def __init__(self, daemon_port=None, peer_port=None):
         super().__init__()
-        self._daemon = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._daemon.connect(("127.0.0.1", daemon_port))
-        self._peer = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._peer.bind(("127.0.0.1", 0))
-        self.port = self._peer.getsockname()[1]
-        self._address = None
+        # Who has no port yet has it when it is first heard.
+        self._addresses = {}
+        self._daemon = self._open(daemon_port)
+        self._peer = self._open(peer_port)
+        self.port = (self._peer if peer_port is None else self._daemon).getsockname()[1]
         self.start()
+
+    def _open(self, far_port):
+        end = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        end.bind(("127.0.0.1", 0))
+        self._addresses[end] = far_port and ("127.0.0.1", far_port)
+        return end
 
     def _pass_on(self):
         readable, _, _ = select.select([self._daemon, self._peer], [], [], 0.1)
-        try:
-            if self._peer in readable:
-                data, self._address = self._peer.recvfrom(65536)
-                self._keep(self._from_peer, data)
-                self._daemon.send(data)
-            if self._daemon in readable:
-                data = self._daemon.recv(65536)
-                self._keep(self._from_daemon, data)
-                self._peer.sendto(data, self._address)
-        except ConnectionRefusedError:
-            pass  # one of them is not up yet, or no more
+        for near, far, chunks in (
+            (self._daemon, self._peer, self._from_daemon),
+            (self._peer, self._daemon, self._from_peer),
+        ):
+            if near in readable:
+                data, self._addresses[near] = near.recvfrom(65536)
+                self._keep(chunks, data)
+                if self._addresses[far]:
+                    far.sendto(data, self._addresses[far])
 
     def close(self):
         super().close()
@@ -199,7 +223,13 @@ class Rig:
         self._autopilot = autopilot
         self._settings = settings
         self._processes = []
+        self._wires = []
+        # Where the camera looks, by the gimbal's own word on its cable.
+        self.camera = Attitudes()
+        self._camera_decoder = mavlink.MAVLink(None)
+        self._camera_decoder.robust_parsing = True
         self.ground_port = free_port()
+        # Where the daemon's messages go unasked, by way of `listener`.
         self.listener_port = free_port()
         self._listen = f"127.0.0.1:{free_port(socket.SOCK_STREAM)}"
         self.http = f"http://{self._listen}"
@@ -208,8 +238,9 @@ class Rig:
         LOGS.mkdir(parents=True, exist_ok=True)
         self._folder = tempfile.TemporaryDirectory(prefix="gimbald-")
         autopilot_port = free_port()
-        self.cable = Cable()
-        self.wire = Wire(autopilot_port)
+        self.cable = Cable(self._see)
+        self.wire = self._lay(Wire(autopilot_port))
+        self.listener = self._lay(Wire(peer_port=self.listener_port))
         config = pathlib.Path(self._folder.name) / "gimbald.toml"
         config.write_text(
             f"""
@@ -231,7 +262,7 @@ endpoint = "udpin:127.0.0.1:{self.ground_port}"
 [[link]]
 name = "listener"
 role = "ground"
-endpoint = "udpout:127.0.0.1:{self.listener_port}"
+endpoint = "udpout:127.0.0.1:{self.listener.port}"
 
 [http]
 listen = "{self._listen}"
@@ -256,8 +287,22 @@ listen = "{self._listen}"
         for process in reversed(self._processes):
             process.kill()
         self.cable.close()
-        self.wire.close()
+        for wire in self._wires:
+            wire.close()
         self._folder.cleanup()
+
+    def _lay(self, wire):
+        self._wires.append(wire)
+        return wire
+
+    def ground_wire(self):
+        """A path of its own to the daemon for a client that sends to its `port`."""
+        return self._lay(Wire(self.ground_port))
+
+    def _see(self, data):
+        for message in self._camera_decoder.parse_buffer(data) or []:
+            if message.get_type() == "GIMBAL_DEVICE_ATTITUDE_STATUS":
+                self.camera.add_status(message)
 
     def _start(self, part, *arguments):
         process = Process(f"gimbald ({part})", [GIMBALD, *arguments], LOGS / f"{self._name}-{part}.log")
@@ -282,3 +327,19 @@ listen = "{self._listen}"
     def gimbal(self):
         """The only gimbal, as the daemon sees it."""
         return self.status()["gimbals"][0]
+
+    def owners(self):
+        """Primary and secondary control on the page, such as "255/190"; None for nobody."""
+        gimbal = self.gimbal()
+        return gimbal["primary"], gimbal["secondary"]
+
+    def wait_owners(self, primary, secondary=None):
+        wait_for(
+            lambda: f"control by {primary} and {secondary} on the page; it says {self.owners()}",
+            lambda: self.owners() == (primary, secondary),
+            2,
+        )
+
+    def refusals(self, ids):
+        """How many setpoints and commands of `ids` the page counts as refused."""
+        return sum(self.gimbal()["rejected"].get("{}/{}".format(*ids), {}).values())

@@ -41,7 +41,7 @@ class Steps:
     """Runs steps, counts them, and ends the script with the code that they deserve. Steps may run on several threads."""
 
     def __init__(self, prefix):
-        self._prefix = prefix
+        self.prefix = prefix
         self._lock = threading.Lock()
         self._failed = 0
         # The clean-up of every `with` has to run also when the time of the script is over.
@@ -59,7 +59,7 @@ class Steps:
             self._fail(name, f"{type(error).__name__}: {error}")
         else:
             remark = f" ({remark})" if remark else ""
-            self._say(f"ok {self._prefix}: {name}{remark}")
+            self._say(f"ok {self.prefix}: {name}{remark}")
             print(f"{name}: {time.monotonic() - started:.2f} s", file=sys.stderr, flush=True)
             return
         if essential:
@@ -68,7 +68,7 @@ class Steps:
     def _fail(self, name, reason):
         with self._lock:
             self._failed += 1
-        self._say(f"FAILED {self._prefix}: {name}: {' '.join(reason.split())}")
+        self._say(f"FAILED {self.prefix}: {name}: {' '.join(reason.split())}")
 
     def _say(self, line):
         with self._lock:
@@ -79,7 +79,7 @@ class Steps:
         try:
             body()
         except Stopped as stopped:
-            print(f"{self._prefix}: the other steps need '{stopped}'", flush=True)
+            print(f"{self.prefix}: the other steps need '{stopped}'", flush=True)
         except Failure as failure:
             self._fail("set-up", str(failure))
         sys.exit(1 if self._failed else 0)
