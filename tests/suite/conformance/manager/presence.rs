@@ -404,6 +404,8 @@ fn client_items_e31_to_e33_the_information_says_what_works() {
         (usual_capabilities(), true, true),
         (usual_capabilities().difference(CapFlags::HAS_RETRACT), false, true),
         (pitch_only | CapFlags::HAS_YAW_AXIS, false, true),
+        // Nobody states an end of what has none.
+        (usual_capabilities() | CapFlags::SUPPORTS_INFINITE_YAW, true, true),
         (pitch_only | CapFlags::HAS_RETRACT, true, false),
     ] {
         let (mut world, places) = with_gimbal_that(capabilities, three_links());
