@@ -244,13 +244,19 @@ fn read_tests(module: &str, code: &str, tests: &mut BTreeMap<String, BTreeSet<Ru
     }
 }
 
-/// The rules of a script that drives a real client, if `tests/run` runs it.
+/// The rules of a script that drives a real client, and of the modules that it imports, if `tests/run` runs it.
 fn client_script(path: &str) -> Option<BTreeSet<Rule>> {
-    let script = Path::new(path).file_stem()?.to_str()?;
-    let runs_it = read(&root().join("tests/run")).contains(script);
-    let text = fs::read_to_string(root().join(path)).ok().filter(|_| runs_it)?;
-    let words: Vec<&str> = text.split_whitespace().filter(|word| *word != "#").collect();
-    Some(rules_in_comment(&words.join(" ")))
+    let path = root().join(path);
+    let script = path.file_stem()?.to_str()?;
+    let runs_it = read(&root().join("tests/run")).split_whitespace().any(|word| word == script);
+    let text = fs::read_to_string(&path).ok().filter(|_| runs_it)?;
+    let imported = text.lines().filter_map(|line| line.strip_prefix("from ").or_else(|| line.strip_prefix("import ")));
+    let modules = imported.filter_map(|rest| Some(path.with_file_name(rest.split_whitespace().next()?)));
+    let mut texts: Vec<String> =
+        modules.filter_map(|module| fs::read_to_string(module.with_extension("py")).ok()).collect();
+    texts.push(text);
+    let comment = |text: &String| text.split_whitespace().filter(|word| *word != "#").collect::<Vec<_>>().join(" ");
+    Some(texts.iter().flat_map(|text| rules_in_comment(&comment(text))).collect())
 }
 
 fn rules_in_name(name: &str) -> BTreeSet<Rule> {

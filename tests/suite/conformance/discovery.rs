@@ -181,6 +181,22 @@ fn item_31_two_gimbals_have_two_managers() {
     }
 }
 
+/// Guide: "the numbers 1 to 6 can't be used as MAVLink component IDs for any components involved as gimbal managers or
+/// gimbal devices"; and component 0 is nobody.
+#[test]
+fn item_25_a_component_below_7_is_no_gimbal() {
+    let (mut world, places) = World::empty(three_links());
+    for component in 0..=6 {
+        world.send(places.gimbal, MavId::new(1, component), &gimbal_heartbeat());
+        let information = device_information(world.now, usual_capabilities());
+        world.send(places.gimbal, MavId::new(1, component), &MavMessage::GIMBAL_DEVICE_INFORMATION(information));
+    }
+    world.run_for(SECOND);
+
+    assert_eq!(world.snapshot().gimbals, []);
+    assert!(world.take(places.gimbal).iter().all(|arrival| arrival.id() == 0), "nothing but heartbeats");
+}
+
 /// "When 285 comes with ext gimbal_device_id = 1 from compid 191 of another system component, it is attributed to (that
 /// component, 1), not to device 154."
 /// Protocol checklist 33: "When 285 has ext gimbal_device_id = 7, it is ignored for management, but forwarded."

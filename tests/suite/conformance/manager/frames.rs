@@ -24,6 +24,7 @@ use crate::support::world::{AUTOPILOT, GCS, GIMBAL, Places, World};
 /// if non-zero."
 /// Protocol checklist 106: "When 285 has flags 12 (legacy, no LOCK), yaw is vehicle".
 /// Protocol checklist 108: "When delta_yaw is NaN, the autopilot's heading is used."
+/// A-07: a gimbal that reports the vehicle frame while locked (60) is believed in that.
 #[test]
 #[rustfmt::skip]
 fn items_103_to_108_yaw_is_shown_in_both_frames() {
@@ -35,6 +36,8 @@ fn items_103_to_108_yaw_is_shown_in_both_frames() {
         (44,    30.0,  f32::NAN,  30.0,       40.0),
         (76,    30.0,  f32::NAN,  20.0,       30.0),
         (44,    170.0, 100.0,     170.0,      -90.0),
+        (60,    30.0,  100.0,     30.0,       130.0),
+        (60,    30.0,  f32::NAN,  30.0,       40.0),
     ] {
         let (mut world, places) = with_gimbal();
         turn_vehicle(&mut world, places, 10.0);
