@@ -22,6 +22,9 @@ pub struct Limits {
 /// precision) does not send the gimbal round the other way.
 const ROUNDING: Angle = Angle::from_degrees(0.01);
 
+/// How much nearer the other end stop has to look for a gimbal to swing there all the way round.
+const SWING_FOR: Angle = Angle::from_degrees(10.0);
+
 impl AxisLimits {
     /// `None` when a limit is not finite, or `min` lies above `max`.
     pub fn new(min: Angle, max: Angle) -> Option<Self> {
@@ -78,10 +81,17 @@ impl Limits {
     /// The yaw to turn to from `current`, both in the vehicle frame, to look along `wanted` or as near as can be.
     ///
     /// Without end stops it is the short way, so the result may lie beyond ±180°; wrap it where turns do not count.
+    ///
+    /// Where it cannot look, behind its end stops, it stays at the end it is at until the other is clearly better:
+    /// otherwise a direction that wobbles about the back would have it swing from one end to the other.
     pub fn clamp_yaw(&self, wanted: Angle, current: Angle) -> Angle {
-        match self.yaw {
-            Some(limits) => limits.clamp_turns(wanted, current),
-            None => wanted.nearest_to(current),
+        let Some(limits) = self.yaw else { return wanted.nearest_to(current) };
+        let nearest = limits.clamp_turns(wanted, current);
+        let miss = |end: Angle| (end - wanted).wrapped().abs();
+        let at_end = [limits.min, limits.max].into_iter().find(|end| (*end - current).abs() <= ROUNDING);
+        match at_end {
+            Some(end) if miss(nearest) > ROUNDING && miss(end) - miss(nearest) < SWING_FOR => end,
+            _ => nearest,
         }
     }
 }
@@ -147,6 +157,28 @@ mod tests {
             let yaw = gimbal.clamp_yaw(Angle::from_degrees(wanted), Angle::from_degrees(current)).degrees();
 
             assert!((yaw - expected).abs() < 1e-4, "{wanted}° from {current}° within {min}..{max} gave {yaw}°");
+        }
+    }
+
+    #[test]
+    #[rustfmt::skip]
+    fn behind_its_end_stops_yaw_stays_at_the_end_it_is_at() {
+        for (wanted, current, expected) in [
+            (175.0,    160.0,  160.0),
+            (-179.0,   160.0,  160.0),
+            (-175.5,   160.0,  160.0),
+            (-174.5,   160.0, -160.0),
+            (-175.5,   150.0, -160.0),
+            (-150.0,   160.0, -150.0),
+            (175.5,   -160.0, -160.0),
+            (174.5,   -160.0,  160.0),
+            (159.0,   -160.0,  159.0),
+        ] {
+            let gimbal = Limits { yaw: Some(limits(-160.0, 160.0)), ..Limits::default() };
+
+            let yaw = gimbal.clamp_yaw(Angle::from_degrees(wanted), Angle::from_degrees(current)).degrees();
+
+            assert!((yaw - expected).abs() < 1e-4, "{wanted}° from {current}° gave {yaw}°");
         }
     }
 
