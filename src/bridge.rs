@@ -373,6 +373,7 @@ impl Bridge {
             return;
         }
         self.beat(now, self.channels.open_set());
+        self.handle_vehicle(now);
         if self.identity.autopilots(now).count() > 1 && self.settings.system_id == settings::SystemId::Auto {
             self.conflicts.note(now, Conflict::SeveralAutopilots);
         }
@@ -392,6 +393,14 @@ impl Bridge {
                 let (component, message) = (gimbal.component, heartbeat::heartbeat(gimbal, bootstrap));
                 self.send(now, channels, component, &message);
             }
+        }
+    }
+
+    /// The managers are shown what is known of the vehicle, also when nothing new was heard of it.
+    fn handle_vehicle(&mut self, now: Timestamp) {
+        let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
+        for gimbal in self.roster.iter_mut() {
+            gimbal.manager.handle_vehicle(now, around);
         }
     }
 
@@ -477,9 +486,9 @@ impl Bridge {
                 }
                 self.send(now, channels, component, &message);
             }
-            ManagerOutput::Heartbeat { channel } => {
+            ManagerOutput::Heartbeat { channels } => {
                 let message = heartbeat::heartbeat(self.roster.get_mut(at), self.identity.is_bootstrap());
-                self.answer(now, channel.into(), component, &message);
+                self.answer(now, channels.unwrap_or(self.channels.open_set()), component, &message);
             }
             ManagerOutput::Steer(setpoint) => self.roster.get_mut(at).driver.handle_setpoint(now, setpoint),
             ManagerOutput::Event(event) => self.handle_event(now, at, event),

@@ -14,6 +14,9 @@ pub mod settings;
 pub mod tracking;
 
 mod commands;
+mod inquiries;
+mod mount;
+mod roi;
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
@@ -29,10 +32,12 @@ use crate::vehicle::Vehicle;
 use crate::wire::MavId;
 use crate::wire::dialect::MavMessage;
 use crate::wire::ids::{CommandResult, FailureFlags, GimbalFlags};
+use commands::LastCommand;
 use control::{Change, Control, PRIMARY_SILENCE, Place, Policy};
 use events::{Event, RatesEnd};
 use intervals::{DEFAULT_STATUS_INTERVAL, Schedule};
 use messages::Interval;
+use mount::ConfiguredInputs;
 use rank::Ranks;
 use request::{Demand, DemandKind, Refusal, Request};
 use settings::ControlSettings;
@@ -83,9 +88,9 @@ pub enum ManagerOutput {
         channels: Option<ChannelSet>,
         message: Box<MavMessage>,
     },
-    /// The heartbeat was asked for.
+    /// The heartbeat was asked for, on these channels or on all.
     Heartbeat {
-        channel: ChannelId,
+        channels: Option<ChannelSet>,
     },
     Steer(Setpoint),
     /// For whoever looks.
@@ -135,6 +140,10 @@ pub struct GimbalManager {
     told_flags: GimbalFlags,
     /// Where the gimbal was last told to look, of which an event told.
     told_roi: Option<Position>,
+    /// What the last 280 said of pointing at places.
+    told_can_aim: bool,
+    last_command: Option<LastCommand>,
+    configured_inputs: ConfiguredInputs,
     rejected: BTreeMap<MavId, BTreeMap<&'static str, u64>>,
     outputs: VecDeque<ManagerOutput>,
 }
@@ -158,6 +167,9 @@ impl GimbalManager {
             primary_demand: None,
             told_flags: GimbalFlags::empty(),
             told_roi: None,
+            told_can_aim: false,
+            last_command: None,
+            configured_inputs: ConfiguredInputs::default(),
             rejected: BTreeMap::new(),
             outputs: VecDeque::new(),
         }
@@ -182,8 +194,10 @@ impl GimbalManager {
                 if *gimbal != 0 && Some(*gimbal) != self.device_id() {
                     return;
                 }
-                if let Err(refusal) = self.handle_demand(now, sender.id, demand, around) {
-                    self.count_refusal(sender.id, refusal.reason);
+                match self.handle_demand(now, sender.id, demand, around) {
+                    // A command that comes after it is none of the past.
+                    Ok(()) => self.last_command = None,
+                    Err(refusal) => self.count_refusal(sender.id, refusal.reason),
                 }
             }
             Request::Command(command) => self.handle_command(now, sender, command, around),
@@ -203,6 +217,9 @@ impl GimbalManager {
 
     /// News from the driver.
     pub fn handle_report(&mut self, now: Timestamp, report: Report, around: Surroundings<'_>) {
+        if !matches!(report, Report::Attitude(_)) {
+            self.last_command = None;
+        }
         match report {
             Report::Restarted => {
                 self.tracking.forget();
@@ -228,9 +245,7 @@ impl GimbalManager {
                 if changed {
                     let (vendor, model) = (&self.identity.vendor, &self.identity.model);
                     tracing::info!(gimbal = self.settings.name, vendor, model, "gimbal known");
-                    if let Some(message) = self.information(now) {
-                        self.outputs.push_back(ManagerOutput::Broadcast { channels: None, message });
-                    }
+                    self.announce(now, around);
                 }
             }
             Report::Attitude(status) => {
@@ -245,6 +260,23 @@ impl GimbalManager {
                 self.tracking.forget();
                 self.tell(Event::Lost { device: self.device });
             }
+        }
+        self.carry_out(now, around);
+    }
+
+    /// More, or less, may be known of the vehicle.
+    pub fn handle_vehicle(&mut self, now: Timestamp, around: Surroundings<'_>) {
+        self.carry_out(now, around);
+    }
+
+    /// The autopilot told how the vehicle is turned; a setpoint that turns with it follows at once.
+    ///
+    /// Its position does not have that effect: it changes slowly, and would use up the moment of the attitude that often
+    /// comes in the same datagram.
+    pub fn handle_turned(&mut self, now: Timestamp, around: Surroundings<'_>) {
+        if let Some(capabilities) = self.capabilities {
+            let situation = self.situation(now, &capabilities, around);
+            self.tracking.handle_turned(now, &situation);
         }
         self.carry_out(now, around);
     }
@@ -273,7 +305,7 @@ impl GimbalManager {
         }
         let due = self.information_schedule.take_due(now);
         if !due.is_empty()
-            && let Some(message) = self.information(now)
+            && let Some(message) = self.information(now, around)
         {
             self.outputs.push_back(ManagerOutput::Broadcast { channels: Some(due), message });
         }
@@ -421,11 +453,16 @@ impl GimbalManager {
         let situation = self.situation(now, &capabilities, around);
         let timeouts = self.timeouts();
         self.tracking.demand(now, sender, &demand, &situation, timeouts)?;
+        self.note_demand(now, sender);
+        Ok(())
+    }
+
+    /// `sender` was obeyed.
+    fn note_demand(&mut self, now: Timestamp, sender: MavId) {
         self.source_heard = now;
         if self.control.primary() == Some(sender) {
             self.primary_demand = Some(now);
         }
-        Ok(())
     }
 
     fn timeouts(&self) -> RateTimeouts {
@@ -473,6 +510,9 @@ impl GimbalManager {
         if flags != self.told_flags {
             self.broadcast_status(now);
         }
+        if can_aim(now, around) != self.told_can_aim {
+            self.announce(now, around);
+        }
     }
 
     /// A 281 to everybody, besides the regular ones.
@@ -495,6 +535,7 @@ impl GimbalManager {
         if changes.is_empty() {
             return;
         }
+        self.last_command = None;
         let holders = [self.control.primary(), self.control.secondary()];
         let source = self.tracking.source();
         let source_lost_its_place =
@@ -517,10 +558,18 @@ impl GimbalManager {
         self.tracking.is_rotating().then(|| self.source_heard + self.rules.lease_timeout)
     }
 
+    /// 280 to everybody, once the gimbal is known.
+    fn announce(&mut self, now: Timestamp, around: Surroundings<'_>) {
+        self.told_can_aim = can_aim(now, around);
+        if let Some(message) = self.information(now, around) {
+            self.outputs.push_back(ManagerOutput::Broadcast { channels: None, message });
+        }
+    }
+
     /// 280, once the gimbal is known.
-    fn information(&self, now: Timestamp) -> Option<Box<MavMessage>> {
+    fn information(&self, now: Timestamp, around: Surroundings<'_>) -> Option<Box<MavMessage>> {
         let (device_id, capabilities) = (self.device_id()?, self.capabilities.as_ref()?);
-        Some(Box::new(messages::information(now, device_id, capabilities, true)))
+        Some(Box::new(messages::information(now, device_id, capabilities, can_aim(now, around))))
     }
 
     /// 281, once there is a gimbal.
@@ -528,4 +577,10 @@ impl GimbalManager {
         let (primary, secondary) = (self.control.primary(), self.control.secondary());
         Some(Box::new(messages::status(now, self.device_id()?, self.flags(), primary, secondary)))
     }
+}
+
+/// Whether a region of interest can be accepted: the vehicle tells where it is. That its heading is missing for a moment,
+/// where the gimbal needs one, makes no other gimbal of it.
+fn can_aim(now: Timestamp, around: Surroundings<'_>) -> bool {
+    around.vehicle.position(now).is_some()
 }

@@ -75,6 +75,21 @@ impl Bridge {
         }
         self.vehicle.handle_frame(now, frame);
         self.streams.handle_seen(now, frame.message_id());
+        self.show_vehicle(now, frame.message_id());
+    }
+
+    /// The managers are shown what one message of the autopilot changed.
+    fn show_vehicle(&mut self, now: Timestamp, message_id: u32) {
+        let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
+        for gimbal in self.roster.iter_mut() {
+            match message_id {
+                message::ATTITUDE | message::ATTITUDE_QUATERNION | message::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE => {
+                    gimbal.manager.handle_turned(now, around);
+                }
+                message::GLOBAL_POSITION_INT => gimbal.manager.handle_vehicle(now, around),
+                _ => {}
+            }
+        }
     }
 
     fn handle_heartbeat(&mut self, now: Timestamp, place: Place, role: Role, frame: &Frame<'_>) {
@@ -148,7 +163,7 @@ impl Bridge {
             return;
         }
         let target = frame.target();
-        let overheard = self.is_overheard(frame);
+        let overheard = self.is_overheard(now, from, frame);
         let for_us = |component: u8| overheard || target.includes(MavId::new(system, component));
         if !self.roster.iter().any(|gimbal| for_us(gimbal.component)) || self.is_own_id(frame.source()) {
             return;
@@ -166,8 +181,9 @@ impl Bridge {
         }
     }
 
-    /// Whether we are to act on a command to the autopilot that passes through us (`snoop_autopilot`).
-    fn is_overheard(&self, frame: &Frame<'_>) -> bool {
+    /// Whether we are to act on a command to the autopilot that passes through us (`snoop_autopilot`). One that we do not
+    /// forward to it is none of our business, and what the autopilot's own id says is not said to it.
+    fn is_overheard(&mut self, now: Timestamp, from: ChannelId, frame: &Frame<'_>) -> bool {
         const WORTH_HEARING: [u16; 7] = [
             command::DO_SET_ROI_LOCATION,
             command::DO_SET_ROI_NONE,
@@ -180,7 +196,9 @@ impl Bridge {
         let Target::Component(target) = frame.target() else { return false };
         self.settings.control.snoop_autopilot
             && self.autopilot == Some(target)
+            && frame.source() != target
             && command_number(frame).is_some_and(|number| WORTH_HEARING.contains(&number))
+            && !self.router.route(now, from, frame.source(), frame.target()).channels.is_empty()
     }
 
     fn forward(&mut self, now: Timestamp, Place { link, channel: from }: Place, role: Role, frame: &Frame<'_>) {

@@ -153,6 +153,9 @@ pub struct SetpointSnapshot {
     pub yaw_rate_dps: Option<f64>,
     /// Whose demand it is, as `system/component`.
     pub source: Option<String>,
+    /// It is held as it is, because the position or heading of the vehicle that it follows is not known any more.
+    #[serde(default)]
+    pub stale: bool,
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

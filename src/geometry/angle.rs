@@ -124,6 +124,10 @@ impl AngularRate {
         Self::from_radians_per_second(self.radians_per_second.abs())
     }
 
+    pub fn is_zero(self) -> bool {
+        self.radians_per_second == 0.0
+    }
+
     /// The nearest rate between `min` and `max`.
     pub const fn clamp(self, min: Self, max: Self) -> Self {
         Self::from_radians_per_second(self.radians_per_second.max(min.radians_per_second).min(max.radians_per_second))

@@ -22,6 +22,7 @@ pub struct Pointing {
     /// Its frame also says what it is kept to: the vehicle's nose, or North.
     pub yaw: Yaw,
     pub stabilised: Stabilised,
+    pub radio_control: RadioControl,
 }
 
 /// A continuous rotation.
@@ -33,6 +34,7 @@ pub struct Turning {
     pub yaw: AngularRate,
     pub yaw_frame: YawFrame,
     pub stabilised: Stabilised,
+    pub radio_control: RadioControl,
 }
 
 /// Which axes are held to the horizon rather than to the airframe (`ROLL_LOCK`, `PITCH_LOCK`).
@@ -46,14 +48,49 @@ impl Stabilised {
     pub const BOTH: Self = Self { roll: true, pitch: true };
 }
 
+/// What part the radio control inputs of the gimbal itself have.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RadioControl {
+    #[default]
+    Off,
+    /// `RC_MIXED`: combined with what the gimbal is told, as the device sees fit.
+    Mixed,
+    /// `RC_EXCLUSIVE`: the gimbal ignores what it is told.
+    Exclusive,
+}
+
+impl RadioControl {
+    pub fn of_flags(flags: GimbalFlags) -> Self {
+        if flags.contains(GimbalFlags::RC_EXCLUSIVE) {
+            Self::Exclusive
+        } else if flags.contains(GimbalFlags::RC_MIXED) {
+            Self::Mixed
+        } else {
+            Self::Off
+        }
+    }
+
+    pub const fn flags(self) -> GimbalFlags {
+        match self {
+            Self::Off => GimbalFlags::empty(),
+            Self::Mixed => GimbalFlags::RC_MIXED,
+            Self::Exclusive => GimbalFlags::RC_EXCLUSIVE,
+        }
+    }
+}
+
 impl Setpoint {
     /// The flags as 284 and 281 show them: exactly one frame bit, and `YAW_LOCK` exactly with the earth frame.
     pub fn flags(&self) -> GimbalFlags {
         match *self {
             Setpoint::Retract => GimbalFlags::RETRACT | frame_flags(YawFrame::Vehicle) | lock_flags(Stabilised::BOTH),
             Setpoint::Neutral => GimbalFlags::NEUTRAL | frame_flags(YawFrame::Vehicle) | lock_flags(Stabilised::BOTH),
-            Setpoint::Point(pointing) => frame_flags(pointing.yaw.frame()) | lock_flags(pointing.stabilised),
-            Setpoint::Turn(turning) => frame_flags(turning.yaw_frame) | lock_flags(turning.stabilised),
+            Setpoint::Point(Pointing { yaw, stabilised, radio_control, .. }) => {
+                frame_flags(yaw.frame()) | lock_flags(stabilised) | radio_control.flags()
+            }
+            Setpoint::Turn(Turning { yaw_frame, stabilised, radio_control, .. }) => {
+                frame_flags(yaw_frame) | lock_flags(stabilised) | radio_control.flags()
+            }
         }
     }
 }

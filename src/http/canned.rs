@@ -95,6 +95,7 @@ fn held_gimbal() -> GimbalSnapshot {
             pitch_rate_dps: None,
             yaw_rate_dps: None,
             source: Some("255/190".into()),
+            stale: false,
         }),
         primary: Some("255/190".into()),
         secondary: None,

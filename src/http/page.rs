@@ -9,7 +9,7 @@ const PAGE: &str = include_str!("page.html");
 /// name that a gimbal reports became markup, it could neither run nor load anything.
 const POLICY: &str = "default-src 'none'; \
     style-src 'sha256-RU/i/GMqBqym+LVaNtN9RxPULVvEI8iHHfpN9VUJXLk='; \
-    script-src 'sha256-jpSRtJHj5JmTZtGt0iRnLchG0MViq2CTTmM+jXUhLqw='; \
+    script-src 'sha256-QNLe68UnONeQESd2bzkvmoptLZIH9TkGftz/ILO/Vog='; \
     connect-src 'self'; img-src data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 pub async fn page() -> impl IntoResponse {

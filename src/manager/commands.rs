@@ -1,22 +1,34 @@
 //! `COMMAND_LONG` and `COMMAND_INT` for a gimbal manager, each with its one answer.
+//!
+//! What a command is about is in files of its own: [`super::inquiries`] (512, 511, 510), [`super::roi`] (195, 197),
+//! [`super::mount`] (204, 205). Those that we do not know are refused by name to whoever addressed exactly us, and are
+//! somebody else's business when everybody was asked.
 
-use super::messages::{self, Interval};
-use super::request::{Command, Configure, Form, Refusal};
-use super::settings::AltitudeReference;
-use super::{GimbalManager, ManagerOutput, Sender, Surroundings};
-use crate::geometry::Position;
+use std::time::Duration;
+
+use super::request::{Command, Configure, Refusal};
+use super::{GimbalManager, ManagerOutput, Sender, Surroundings, messages};
 use crate::timestamp::Timestamp;
-use crate::vehicle::Autopilot;
 use crate::wire::MavId;
-use crate::wire::dialect::MavMessage;
-use crate::wire::ids::{CommandResult, command, mav_frame, message};
+use crate::wire::ids::{CommandResult, command};
+
+/// A command that comes again within this time was sent anew because its answer did not come.
+const REPEATED_WITHIN: Duration = Duration::from_secs(1);
 
 /// What becomes of a command.
-enum Outcome {
+pub(super) enum Outcome {
     /// Done.
     Accepted,
-    /// Not for us: addressed to everybody, and somebody else's business.
+    /// Not for us: addressed to everybody or only overheard, and somebody else's business.
     Ignored,
+}
+
+/// The command that last changed what the gimbal does or who steers it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LastCommand {
+    sender: MavId,
+    command: Command,
+    at: Timestamp,
 }
 
 impl GimbalManager {
@@ -28,20 +40,7 @@ impl GimbalManager {
         around: Surroundings<'_>,
     ) {
         let first_answer = self.outputs.len();
-        let outcome = match command.number {
-            command::DO_GIMBAL_MANAGER_CONFIGURE
-            | command::DO_GIMBAL_MANAGER_PITCHYAW
-            | command::DO_SET_ROI_LOCATION
-            | command::DO_SET_ROI_NONE => self.handle_gimbal_command(now, sender.id, command, around),
-            command::REQUEST_MESSAGE => self.request_message(now, sender, command),
-            command::SET_MESSAGE_INTERVAL => self.set_message_interval(now, sender, command),
-            command::GET_MESSAGE_INTERVAL => Ok(self.get_message_interval(sender, command)),
-            _ if command.is_directed() && !around.overheard => {
-                Err(Refusal { result: CommandResult::Unsupported, reason: "unsupported_command" })
-            }
-            _ => Ok(Outcome::Ignored),
-        };
-        let result = match outcome {
+        let result = match self.execute(now, sender, command, around) {
             Ok(Outcome::Accepted) => CommandResult::Accepted,
             Ok(Outcome::Ignored) => return,
             Err(refusal) => {
@@ -57,7 +56,54 @@ impl GimbalManager {
         self.outputs.insert(first_answer, ManagerOutput::Reply { to: sender.id, channel: sender.channel, message });
     }
 
-    /// A command about the gimbal itself; all but CONFIGURE pass the gate.
+    fn execute(
+        &mut self,
+        now: Timestamp,
+        sender: Sender,
+        command: &Command,
+        around: Surroundings<'_>,
+    ) -> Result<Outcome, Refusal> {
+        match command.number {
+            command::REQUEST_MESSAGE => self.request_message(now, sender, command, around),
+            command::SET_MESSAGE_INTERVAL => self.set_message_interval(now, sender, command),
+            command::GET_MESSAGE_INTERVAL => Ok(self.get_message_interval(sender, command)),
+            command::DO_GIMBAL_MANAGER_CONFIGURE
+            | command::DO_GIMBAL_MANAGER_PITCHYAW
+            | command::DO_SET_ROI_LOCATION
+            | command::DO_SET_ROI_NONE
+            | command::DO_MOUNT_CONFIGURE
+            | command::DO_MOUNT_CONTROL => self.handle_once(now, sender.id, command, around),
+            // Old ground stations say it to the autopilot; among managers it was superseded before there were any.
+            command::DO_SET_ROI if around.overheard => self.handle_once(now, sender.id, command, around),
+            number if command.is_directed() && !around.overheard => Err(unsupported(number)),
+            _ => Ok(Outcome::Ignored),
+        }
+    }
+
+    /// A command about the gimbal itself. A repeat of the one that was accepted last is accepted again and not carried
+    /// out again: angles stay converted with the heading of the first time, and nothing happens twice.
+    fn handle_once(
+        &mut self,
+        now: Timestamp,
+        sender: MavId,
+        command: &Command,
+        around: Surroundings<'_>,
+    ) -> Result<Outcome, Refusal> {
+        let is_repeat = self.last_command.is_some_and(|last| {
+            last.sender == sender && now.since(last.at) <= REPEATED_WITHIN && command.is_repeat_of(&last.command)
+        });
+        if is_repeat {
+            tracing::debug!(gimbal = self.settings.name, %sender, command = command.number, "repeated");
+            return Ok(Outcome::Accepted);
+        }
+        let outcome = self.handle_gimbal_command(now, sender, command, around)?;
+        if matches!(outcome, Outcome::Accepted) {
+            self.last_command = Some(LastCommand { sender, command: *command, at: now });
+        }
+        Ok(outcome)
+    }
+
+    /// All but CONFIGURE pass the gate.
     fn handle_gimbal_command(
         &mut self,
         now: Timestamp,
@@ -65,11 +111,7 @@ impl GimbalManager {
         command: &Command,
         around: Surroundings<'_>,
     ) -> Result<Outcome, Refusal> {
-        let id_parameter = match command.number {
-            command::DO_SET_ROI_LOCATION | command::DO_SET_ROI_NONE => 1,
-            _ => 7,
-        };
-        if !self.concerns_us(command.gimbal(id_parameter)?, command)? {
+        if !self.concerns_us(sender, command, around)? {
             return Ok(Outcome::Ignored);
         }
         if command.number == command::DO_GIMBAL_MANAGER_CONFIGURE {
@@ -80,19 +122,44 @@ impl GimbalManager {
         match command.number {
             command::DO_GIMBAL_MANAGER_PITCHYAW => self.handle_demand(now, sender, &command.pitchyaw()?, around)?,
             command::DO_SET_ROI_LOCATION => self.do_set_roi_location(now, sender, command, around)?,
-            _ => self.do_set_roi_none(now, sender)?,
+            command::DO_SET_ROI_NONE => self.do_set_roi_none(now, sender)?,
+            command::DO_SET_ROI => return self.do_set_roi(now, sender, command, around),
+            command::DO_MOUNT_CONFIGURE => self.do_mount_configure(now, sender, command, around)?,
+            _ => self.do_mount_control(now, sender, command, around)?,
         }
         Ok(Outcome::Accepted)
     }
 
-    /// Whether a command for device `gimbal` concerns this one: an id that nobody here has is refused to whoever asked
-    /// exactly us, and somebody else's business when everybody was asked.
-    fn concerns_us(&self, gimbal: u8, command: &Command) -> Result<bool, Refusal> {
-        match gimbal {
-            0 => Ok(true),
-            id if Some(id) == self.device_id() => Ok(true),
-            _ if command.is_directed() => Err(Refusal::denied("unknown_gimbal")),
-            _ => Ok(false),
+    /// Whether a command is for this gimbal: an id that nobody here has is refused to whoever asked exactly us, and
+    /// somebody else's business when everybody was asked or the autopilot was.
+    fn concerns_us(&self, sender: MavId, command: &Command, around: Surroundings<'_>) -> Result<bool, Refusal> {
+        let exactly_us = command.is_directed() && !around.overheard;
+        if around.other_vehicle && !exactly_us {
+            return Ok(false);
+        }
+        // What an autopilot says to every mount is how it drives one, and no wish of a client.
+        let to_mounts = matches!(command.number, command::DO_MOUNT_CONFIGURE | command::DO_MOUNT_CONTROL);
+        if to_mounts && !exactly_us && around.autopilot == Some(sender) {
+            return Ok(false);
+        }
+        let id = match command.number {
+            command::DO_SET_ROI_LOCATION | command::DO_SET_ROI_NONE => command.gimbal(1),
+            command::DO_GIMBAL_MANAGER_PITCHYAW | command::DO_GIMBAL_MANAGER_CONFIGURE => command.gimbal(7),
+            // The commands of gimbal protocol v1 know of no ids.
+            _ => Ok(0),
+        };
+        // The autopilot may have a gimbal of its own: who names none there means that one (QGroundControl 4.4.0 names).
+        let needs_id = matches!(
+            command.number,
+            command::DO_GIMBAL_MANAGER_PITCHYAW | command::DO_GIMBAL_MANAGER_CONFIGURE if around.overheard
+        );
+        match id {
+            Ok(0) => Ok(!needs_id),
+            Ok(id) if Some(id) == self.device_id() => Ok(true),
+            _ if !exactly_us => Ok(false),
+            Ok(_) if self.device.is_none() => Err(Refusal::later("no_gimbal_yet")),
+            Ok(_) => Err(Refusal::denied("unknown_gimbal")),
+            Err(refusal) => Err(refusal),
         }
     }
 
@@ -112,132 +179,20 @@ impl GimbalManager {
         self.after_changes_of_control(now, &changes);
         Ok(())
     }
-
-    fn do_set_roi_location(
-        &mut self,
-        now: Timestamp,
-        sender: MavId,
-        command: &Command,
-        around: Surroundings<'_>,
-    ) -> Result<(), Refusal> {
-        let Some(place) = self.roi_place(now, command, around)? else {
-            return self.do_set_roi_none(now, sender);
-        };
-        let capabilities = *self.steerable()?;
-        let situation = self.situation(now, &capabilities, around);
-        self.tracking.point_at(now, sender, place, &situation)
-    }
-
-    fn do_set_roi_none(&mut self, now: Timestamp, sender: MavId) -> Result<(), Refusal> {
-        let capabilities = *self.steerable()?;
-        self.tracking.end_roi(now, sender, &capabilities);
-        Ok(())
-    }
-
-    /// The place to look at, `None` for 0, 0, 0, which by tradition ends it.
-    fn roi_place(
-        &self,
-        now: Timestamp,
-        command: &Command,
-        around: Surroundings<'_>,
-    ) -> Result<Option<Position>, Refusal> {
-        let missing = Refusal::denied("no_such_place");
-        let altitude = f64::from(command.finite(7)?.ok_or(missing)?);
-        let (latitude, longitude, relative) = match command.form {
-            Form::Int { x: i32::MAX, .. } | Form::Int { y: i32::MAX, .. } => return Err(missing),
-            Form::Int { frame, x, y } => {
-                let relative = match frame {
-                    mav_frame::GLOBAL | mav_frame::GLOBAL_INT => false,
-                    mav_frame::GLOBAL_RELATIVE_ALT | mav_frame::GLOBAL_RELATIVE_ALT_INT => true,
-                    _ => {
-                        let result = CommandResult::UnsupportedMavFrame;
-                        return Err(Refusal { result, reason: "unsupported_frame" });
-                    }
-                };
-                (f64::from(x) / 1e7, f64::from(y) / 1e7, relative)
-            }
-            Form::Long => {
-                let degrees = |number| command.finite(number)?.map(f64::from).ok_or(missing);
-                let relative = match self.rules.roi_altitude {
-                    AltitudeReference::Amsl => false,
-                    AltitudeReference::Relative => true,
-                    // The frame is not stated; each family takes it for its own.
-                    AltitudeReference::Auto => around.vehicle.autopilot() == Some(Autopilot::ArduPilot),
-                };
-                (degrees(5)?, degrees(6)?, relative)
-            }
-        };
-        if (latitude, longitude, altitude) == (0.0, 0.0, 0.0) {
-            return Ok(None);
-        }
-        if latitude.abs() > 90.0 || longitude.abs() > 180.0 {
-            return Err(missing);
-        }
-        let datum = if relative {
-            around.vehicle.home_altitude_amsl(now).ok_or(Refusal::later("no_home_altitude"))?
-        } else {
-            0.0
-        };
-        Ok(Some(Position { latitude_deg: latitude, longitude_deg: longitude, altitude_m: altitude + datum }))
-    }
-
-    fn request_message(&mut self, now: Timestamp, sender: Sender, command: &Command) -> Result<Outcome, Refusal> {
-        let not_yet = Refusal::later("no_gimbal_yet");
-        let message = match message_id(command, 1) {
-            Some(message::GIMBAL_MANAGER_INFORMATION) => self.information(now).ok_or(not_yet)?,
-            Some(message::GIMBAL_MANAGER_STATUS) => self.status_message(now).ok_or(not_yet)?,
-            Some(message::COMPONENT_INFORMATION_BASIC) => Box::new(messages::component_information_basic(now)),
-            Some(message::MESSAGE_INTERVAL) => {
-                let id = message_id(command, 2).unwrap_or(u32::MAX);
-                Box::new(self.message_interval(sender, id))
-            }
-            Some(message::HEARTBEAT) if command.is_directed() => {
-                self.outputs.push_back(ManagerOutput::Heartbeat { channel: sender.channel });
-                return Ok(Outcome::Accepted);
-            }
-            _ if command.is_directed() => return Err(Refusal::denied("unknown_message")),
-            _ => return Ok(Outcome::Ignored),
-        };
-        self.outputs.push_back(ManagerOutput::Answer { channel: sender.channel, message });
-        Ok(Outcome::Accepted)
-    }
-
-    fn set_message_interval(&mut self, now: Timestamp, sender: Sender, command: &Command) -> Result<Outcome, Refusal> {
-        let micros = command.param(2).unwrap_or(0.0);
-        let schedule = match message_id(command, 1) {
-            Some(message::GIMBAL_MANAGER_STATUS) => &mut self.status_schedule,
-            Some(message::GIMBAL_MANAGER_INFORMATION) => &mut self.information_schedule,
-            _ if command.is_directed() => return Err(Refusal::denied("unknown_message")),
-            _ => return Ok(Outcome::Ignored),
-        };
-        let set = schedule.set(now, sender.channel, micros);
-        set.map_err(|_| Refusal::denied("invalid_interval"))?;
-        Ok(Outcome::Accepted)
-    }
-
-    fn get_message_interval(&mut self, sender: Sender, command: &Command) -> Outcome {
-        let id = message_id(command, 1).unwrap_or(u32::MAX);
-        let interval = self.message_interval(sender, id);
-        if !command.is_directed() && interval == messages::message_interval(id, Interval::NotAvailable) {
-            return Outcome::Ignored;
-        }
-        self.outputs.push_back(ManagerOutput::Answer { channel: sender.channel, message: Box::new(interval) });
-        Outcome::Accepted
-    }
-
-    fn message_interval(&self, sender: Sender, message_id: u32) -> MavMessage {
-        let interval = match message_id {
-            message::HEARTBEAT => Interval::Every(std::time::Duration::from_secs(1)),
-            message::GIMBAL_MANAGER_STATUS => self.status_schedule.interval(sender.channel),
-            message::GIMBAL_MANAGER_INFORMATION => self.information_schedule.interval(sender.channel),
-            _ => Interval::NotAvailable,
-        };
-        messages::message_interval(message_id, interval)
-    }
 }
 
-/// A parameter that is a message id; `None` where it can be none.
-fn message_id(command: &Command, number: usize) -> Option<u32> {
-    let id = command.param(number)?;
-    (id.fract() == 0.0 && (0.0..16_777_216.0).contains(&id)).then_some(id as u32)
+/// The refusal of a command that we do not carry out; a person looking reads which one it was.
+fn unsupported(number: u16) -> Refusal {
+    let reason = match number {
+        command::DO_SET_ROI_WPNEXT_OFFSET => "do_set_roi_wpnext_offset_unsupported",
+        command::DO_SET_ROI_SYSID => "do_set_roi_sysid_unsupported",
+        command::DO_SET_ROI => "do_set_roi_unsupported",
+        command::DO_MOUNT_CONTROL_QUAT => "do_mount_control_quat_unsupported",
+        command::PREFLIGHT_REBOOT_SHUTDOWN => "preflight_reboot_shutdown_unsupported",
+        command::DO_GIMBAL_MANAGER_TRACK_RECTANGLE => "do_gimbal_manager_track_rectangle_unsupported",
+        command::REQUEST_OPERATOR_CONTROL => "request_operator_control_unsupported",
+        command::GIMBAL_RESET => "gimbal_reset_unsupported",
+        _ => "unsupported_command",
+    };
+    Refusal { result: CommandResult::Unsupported, reason }
 }

@@ -56,9 +56,14 @@ fn range(limits: Option<AxisLimits>, has_axis: bool, substitute: f64) -> (f32, f
 }
 
 /// The device's capabilities with what the manager adds: yaw in either frame, and pointing at a place.
+///
+/// `CAN_POINT_LOCATION_LOCAL` stands for taking angles, as ArduPilot's managers say it and Mission Planner reads it, who
+/// offers no angles without it. A place in a local frame, which the name may also mean, is refused by result 9.
 pub fn manager_capabilities(device: CapFlags, can_aim: bool) -> CapFlags {
     let known = CapFlags::from_bits_retain(0x3ffff);
-    let mut flags = device.intersection(known).difference(CapFlags::CAN_POINT_LOCATION_LOCAL);
+    let mut flags = device.intersection(known);
+    let takes_angles = flags.intersects(CapFlags::HAS_PITCH_AXIS | CapFlags::HAS_YAW_AXIS);
+    flags.set(CapFlags::CAN_POINT_LOCATION_LOCAL, takes_angles);
     if flags.contains(CapFlags::HAS_YAW_AXIS) {
         flags |= CapFlags::HAS_YAW_FOLLOW | CapFlags::HAS_YAW_LOCK | CapFlags::SUPPORTS_YAW_IN_EARTH_FRAME;
     }

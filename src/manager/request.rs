@@ -27,6 +27,8 @@ pub struct Command {
     /// Parameters 1 to 7 as sent; 5 and 6 of a `COMMAND_INT` are in `x` and `y`.
     pub params: [f32; 7],
     pub form: Form,
+    /// How often it was sent before (`confirmation`); `COMMAND_INT` does not count, and has 0.
+    pub confirmation: u8,
 }
 
 /// How the location parameters were sent.
@@ -115,6 +117,7 @@ fn command_long(frame: &Frame<'_>, message: &COMMAND_LONG_DATA) -> Command {
             message.param7,
         ],
         form: Form::Long,
+        confirmation: message.confirmation,
     }
 }
 
@@ -124,8 +127,12 @@ fn command_int(frame: &Frame<'_>, message: &COMMAND_INT_DATA) -> Command {
         target: frame.target(),
         params: [message.param1, message.param2, message.param3, message.param4, f32::NAN, f32::NAN, message.z],
         form: Form::Int { frame: message.frame, x: message.x, y: message.y },
+        confirmation: 0,
     }
 }
+
+/// What the bits of a NaN become in `x` and `y` where a sender casts them through the wrong type; PX4 refuses it too.
+const NAN_AS_INTEGER: i32 = 0x7ff8_0000;
 
 /// `GIMBAL_MANAGER_SET_ATTITUDE` (282): a quaternion of four NaN states no angle.
 fn set_attitude(message: &GIMBAL_MANAGER_SET_ATTITUDE_DATA) -> Result<Request, Refusal> {
@@ -153,8 +160,8 @@ fn set_pitchyaw(message: &GIMBAL_MANAGER_SET_PITCHYAW_DATA) -> Result<Request, R
         demand: Demand {
             flags: GimbalFlags::from_bits_retain(message.flags as u16),
             roll: AxisDemand::default(),
-            pitch: AxisDemand { angle: angle(message.pitch)?, rate: rate(message.pitch_rate)? },
-            yaw: AxisDemand { angle: angle(message.yaw)?, rate: rate(message.yaw_rate)? },
+            pitch: AxisDemand { angle: angle(message.pitch, PITCH_RANGE)?, rate: rate(message.pitch_rate)? },
+            yaw: AxisDemand { angle: angle(message.yaw, YAW_RANGE)?, rate: rate(message.yaw_rate)? },
             kind: DemandKind::Streamed,
         },
     })
@@ -163,9 +170,10 @@ fn set_pitchyaw(message: &GIMBAL_MANAGER_SET_PITCHYAW_DATA) -> Result<Request, R
 /// `GIMBAL_MANAGER_SET_MANUAL_CONTROL` (288), −1 to 1; beyond that is taken for the end.
 fn set_manual_control(message: &GIMBAL_MANAGER_SET_MANUAL_CONTROL_DATA) -> Result<Request, Refusal> {
     let axis = |stick: f32, rate_stick: f32| -> Result<AxisDemand, Refusal> {
-        let rate = rate(rate_stick.clamp(-1.0, 1.0))?;
+        let fraction = |stick: f32| Ok(number(stick)?.map(|stick| stick.clamp(-1.0, 1.0)));
+        let rate = fraction(rate_stick)?.map(AngularRate::from_radians_per_second);
         // A rate that is given wins over an angle on the same axis.
-        let angle = if rate.is_some() { None } else { angle(stick.clamp(-1.0, 1.0))? };
+        let angle = fraction(stick)?.filter(|_| rate.is_none()).map(Angle::from_radians);
         Ok(AxisDemand { angle, rate })
     };
     Ok(Request::Demand {
@@ -180,14 +188,20 @@ fn set_manual_control(message: &GIMBAL_MANAGER_SET_MANUAL_CONTROL_DATA) -> Resul
     })
 }
 
-/// More than a turn either way is no angle of a gimbal; the margin is for rounding.
-const LARGEST_ANGLE: f64 = std::f64::consts::TAU + 1e-3;
+/// Degrees: beyond half a turn of pitch, or a turn of yaw, is no angle of a gimbal.
+const PITCH_RANGE: f64 = 180.0;
+const YAW_RANGE: f64 = 360.0;
+
+/// Degrees; an angle in radians may be rounded to beyond its range.
+const ROUNDING: f64 = 0.01;
 
 /// Radians per second; no gimbal turns a hundredth as fast for long.
 const LARGEST_RATE: f64 = 100.0;
 
-fn angle(radians: f32) -> Result<Option<Angle>, Refusal> {
-    within(number(radians)?, LARGEST_ANGLE, "angle_out_of_range").map(|angle| angle.map(Angle::from_radians))
+fn angle(radians: f32, range: f64) -> Result<Option<Angle>, Refusal> {
+    let degrees = number(radians)?.map(f64::to_degrees);
+    let angle = within(degrees, range + ROUNDING, "angle_out_of_range")?;
+    Ok(angle.map(|degrees| Angle::from_degrees(degrees).wrapped()))
 }
 
 fn rate(radians_per_second: f32) -> Result<Option<AngularRate>, Refusal> {
@@ -236,8 +250,26 @@ impl Command {
         }
     }
 
-    /// `GIMBAL_MANAGER_FLAGS` in parameter 5, which a `COMMAND_INT` carries unscaled in `x`.
+    /// Whether it is `earlier` again, sent anew because its answer did not come.
+    pub fn is_repeat_of(&self, earlier: &Self) -> bool {
+        let bits = |command: &Self| command.params.map(f32::to_bits);
+        self.confirmation > earlier.confirmation
+            && (self.number, self.target, self.form) == (earlier.number, earlier.target, earlier.form)
+            && bits(self) == bits(earlier)
+    }
+
+    /// Refuses `x` and `y` that are no numbers.
+    pub fn check_integers(&self) -> Result<(), Refusal> {
+        match self.form {
+            Form::Int { x: NAN_AS_INTEGER, y: NAN_AS_INTEGER, .. } => Err(Refusal::denied("nan_as_integer")),
+            Form::Int { .. } | Form::Long => Ok(()),
+        }
+    }
+
+    /// `GIMBAL_MANAGER_FLAGS` in parameter 5, which a `COMMAND_INT` carries unscaled in `x`. What stands above the 16
+    /// bits that the definitions share with devices is ignored.
     fn flags(&self) -> Result<GimbalFlags, Refusal> {
+        self.check_integers()?;
         let bits = match self.form {
             Form::Int { x: i32::MAX, .. } => 0,
             Form::Int { x, .. } => u32::try_from(x).map_err(|_| Refusal::denied("malformed_flags"))?,
@@ -255,15 +287,12 @@ impl Command {
         debug_assert_eq!(self.number, command::DO_GIMBAL_MANAGER_PITCHYAW);
         let degrees = |number| Ok(self.finite(number)?.map(f64::from));
         let (pitch, yaw) = (degrees(1)?, degrees(2)?);
-        if pitch.is_some_and(|pitch| pitch.abs() > 180.0) || yaw.is_some_and(|yaw| yaw.abs() > 360.0) {
-            return Err(Refusal::denied("angle_out_of_range"));
-        }
-        let largest = LARGEST_RATE.to_degrees();
-        let pitch_rate = within(degrees(3)?, largest, "rate_out_of_range")?;
-        let yaw_rate = within(degrees(4)?, largest, "rate_out_of_range")?;
-        let axis = |angle: Option<f64>, rate: Option<f64>| AxisDemand {
-            angle: angle.map(|angle| Angle::from_degrees(angle).wrapped()),
-            rate: rate.map(AngularRate::from_degrees_per_second),
+        let pitch = within(pitch, PITCH_RANGE, "angle_out_of_range")?;
+        let yaw = within(yaw, YAW_RANGE, "angle_out_of_range")?;
+        let (pitch_rate, yaw_rate) = (self.degrees_per_second(3)?, self.degrees_per_second(4)?);
+        let axis = |angle: Option<f64>, rate: Option<AngularRate>| {
+            let angle = angle.map(|angle| Angle::from_degrees(angle).wrapped());
+            AxisDemand { angle, rate }
         };
         let demand = Demand {
             flags: self.flags()?,
@@ -274,6 +303,13 @@ impl Command {
         };
         check(&demand)?;
         Ok(demand)
+    }
+
+    /// A parameter that is a rate.
+    pub fn degrees_per_second(&self, number: usize) -> Result<Option<AngularRate>, Refusal> {
+        let rate = self.finite(number)?.map(f64::from);
+        let rate = within(rate, LARGEST_RATE.to_degrees(), "rate_out_of_range")?;
+        Ok(rate.map(AngularRate::from_degrees_per_second))
     }
 
     /// A parameter that must not be infinite.

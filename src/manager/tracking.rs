@@ -4,6 +4,7 @@
 
 mod motion;
 mod reading;
+mod roi;
 mod situation;
 
 use std::time::Duration;
@@ -12,14 +13,18 @@ use super::request::{Demand, Refusal};
 use crate::geometry::{Angle, Position, Yaw, YawFrame};
 use crate::gimbals::adapt;
 use crate::gimbals::capabilities::Capabilities;
-use crate::gimbals::setpoint::{Pointing, Setpoint, Stabilised};
+use crate::gimbals::setpoint::{Pointing, RadioControl, Setpoint, Stabilised};
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 use crate::wire::ids::CapFlags;
 pub use motion::SETTLE;
-use motion::{Motion, Point, Turn, clamp_yaw, is_zero};
+use motion::{Motion, Point, Turn, clamp_yaw, is_zero, way};
+use roi::Roi;
 use situation::Pose;
 pub use situation::Situation;
+
+/// So long after radio control was asked to let go of the gimbal, the gimbal may still say that it has it.
+const LETTING_GO: Duration = Duration::from_secs(1);
 
 /// How long rates last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,6 +47,11 @@ pub struct Tracking {
     last: Option<Setpoint>,
     /// A rate has ended because it was not refreshed, and nobody has asked yet.
     timed_out: bool,
+    last_at: Timestamp,
+    /// What the aim takes is not known at present, so the last setpoint is held.
+    stale: bool,
+    /// When radio control was last asked to let go of the gimbal.
+    let_go: Option<Timestamp>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,7 +61,7 @@ enum Aim {
     Neutral,
     Turn(Turn),
     Point(Point),
-    Roi(Position),
+    Roi(Roi),
 }
 
 impl Tracking {
@@ -65,6 +75,9 @@ impl Tracking {
             carried_to: Timestamp::ZERO,
             last: None,
             timed_out: false,
+            last_at: Timestamp::ZERO,
+            stale: false,
+            let_go: None,
         }
     }
 
@@ -78,7 +91,14 @@ impl Tracking {
         timeouts: RateTimeouts,
     ) -> Result<(), Refusal> {
         self.carry_on(now, situation);
-        let aim = self.read_demand(now, demand, situation, timeouts)?;
+        let Some(aim) = self.read_demand(now, demand, situation, timeouts)? else { return Ok(()) };
+        let hands_over = is_handed_over(&aim);
+        if self.is_radio_controlled(now, situation) && !hands_over && !is_handed_over(&self.aim) {
+            return Err(Refusal::later("radio_control_has_it"));
+        }
+        if is_handed_over(&self.aim) && !hands_over {
+            self.let_go = Some(now);
+        }
         self.begin(now, source, aim);
         Ok(())
     }
@@ -95,7 +115,10 @@ impl Tracking {
             return Err(Refusal::later("no_vehicle_position"));
         }
         self.need_frame(YawFrame::Earth, situation)?;
-        self.begin(now, source, Aim::Roi(place));
+        if self.is_radio_controlled(now, situation) {
+            return Err(Refusal::later("radio_control_has_it"));
+        }
+        self.begin(now, source, Aim::Roi(Roi::new(place)));
         Ok(())
     }
 
@@ -150,6 +173,20 @@ impl Tracking {
         self.source = None;
         self.next = None;
         self.last = None;
+        self.stale = false;
+        self.let_go = None;
+    }
+
+    /// The vehicle has turned: where the setpoint follows it, the next one is due unless one has just been sent.
+    pub fn handle_turned(&mut self, now: Timestamp, situation: &Situation<'_>) {
+        let follows = match &self.aim {
+            Aim::Roi(_) => situation.device_frame(YawFrame::Earth) != YawFrame::Earth,
+            Aim::Point(point) => situation.device_frame(point.frame) != point.frame,
+            Aim::Idle | Aim::Retract | Aim::Neutral | Aim::Turn(_) => false,
+        };
+        if follows && now.since(self.last_at) >= self.period * 4 / 5 {
+            self.next = Some(now);
+        }
     }
 
     /// The next setpoint for the device, if one is due.
@@ -158,11 +195,21 @@ impl Tracking {
             return None;
         }
         self.carry_on(now, situation);
-        let wanted = self.setpoint(situation);
-        let setpoint = wanted.and_then(|wanted| self.for_device(wanted, situation)).or(self.last);
-        self.last = setpoint;
+        if self.is_radio_controlled(now, situation) {
+            if is_handed_over(&self.aim) {
+                self.next = Some(now + self.period);
+            } else {
+                // What was asked for before must not move the gimbal when its radio control lets go of it.
+                self.forget();
+            }
+            return None;
+        }
+        let wanted = self.setpoint(situation).and_then(|wanted| self.for_device(wanted, situation));
+        self.note_stale(wanted.is_none() || self.has_lost_the_vehicle(situation));
+        self.last = wanted.or(self.last);
+        self.last_at = now;
         self.next = (self.aim != Aim::Idle).then(|| now + self.period);
-        setpoint
+        self.last
     }
 
     pub fn poll_timeout(&self) -> Option<Timestamp> {
@@ -189,6 +236,11 @@ impl Tracking {
         std::mem::take(&mut self.timed_out)
     }
 
+    /// Whether the setpoint is one of the past, because position or heading of the vehicle are not known any more.
+    pub fn is_stale(&self) -> bool {
+        self.stale
+    }
+
     /// The latest setpoint, as the device was told.
     pub fn last(&self) -> Option<Setpoint> {
         self.last
@@ -201,7 +253,7 @@ impl Tracking {
 
     pub fn roi(&self) -> Option<Position> {
         match self.aim {
-            Aim::Roi(place) => Some(place),
+            Aim::Roi(roi) => Some(roi.place),
             _ => None,
         }
     }
@@ -246,16 +298,42 @@ impl Tracking {
             }
             Aim::Point(point) => {
                 let limits = &situation.capabilities.limits;
-                let (frame, heading) = (point.frame, situation.heading);
+                let straight = |from, to| to - from;
+                let frame = point.frame;
+                let way = |from, to| way(from, to, frame, situation);
                 let timed_out = [
-                    point.roll.carry_on(now, passed, |angle| limits.clamp_roll(angle)),
-                    point.pitch.carry_on(now, passed, |angle| limits.clamp_pitch(angle)),
-                    point.yaw.carry_on(now, passed, |angle| clamp_yaw(angle, frame, heading, situation)),
+                    point.roll.carry_on(now, passed, straight, |angle| limits.clamp_roll(angle)),
+                    point.pitch.carry_on(now, passed, straight, |angle| limits.clamp_pitch(angle)),
+                    point.yaw.carry_on(now, passed, way, |angle| clamp_yaw(angle, frame, situation)),
                 ];
                 self.timed_out |= timed_out.contains(&true);
             }
-            Aim::Idle | Aim::Retract | Aim::Neutral | Aim::Roi(_) => {}
+            Aim::Roi(roi) => roi.look_from(situation.position),
+            Aim::Idle | Aim::Retract | Aim::Neutral => {}
         }
+    }
+
+    /// Whether the gimbal is in the hands of its radio control, apart from the time in which that lets go.
+    fn is_radio_controlled(&self, now: Timestamp, situation: &Situation<'_>) -> bool {
+        let letting_go = self.let_go.is_some_and(|at| now.since(at) < LETTING_GO);
+        situation.radio_control_has_it() && !letting_go
+    }
+
+    /// The place is looked at from where the vehicle was.
+    fn has_lost_the_vehicle(&self, situation: &Situation<'_>) -> bool {
+        matches!(self.aim, Aim::Roi(_)) && situation.position.is_none()
+    }
+
+    fn note_stale(&mut self, stale: bool) {
+        if stale != self.stale {
+            let mode = self.mode();
+            if stale {
+                tracing::warn!(mode, "the vehicle's position or heading is missing: the last setpoint is held");
+            } else {
+                tracing::info!(mode, "the vehicle's position and heading are back");
+            }
+        }
+        self.stale = stale;
     }
 
     /// The setpoint of the aim, yaw in the frame it is held in; `None` where what it takes is not known.
@@ -265,25 +343,10 @@ impl Tracking {
             Aim::Retract => Some(Setpoint::Retract),
             Aim::Neutral => Some(Setpoint::Neutral),
             Aim::Turn(turn) => Some(Setpoint::Turn(turn.turning)),
-            Aim::Point(point) => Some(Setpoint::Point(Pointing {
-                roll: point.roll.at,
-                pitch: point.pitch.at,
-                yaw: Yaw::new(point.frame, point.yaw.at),
-                stabilised: point.stabilised,
-            })),
-            Aim::Roi(place) => {
-                let aim = situation.position?.aim_at(place)?;
-                let yaw = match aim.azimuth {
-                    Some(azimuth) => Yaw::InEarthFrame(azimuth),
-                    // Straight above or below any yaw is right: keep the one there is.
-                    None => self.reference(YawFrame::Earth, situation).map(|kept| Yaw::InEarthFrame(kept.yaw.at))?,
-                };
-                Some(Setpoint::Point(Pointing {
-                    roll: Angle::ZERO,
-                    pitch: aim.elevation,
-                    yaw,
-                    stabilised: Stabilised::BOTH,
-                }))
+            Aim::Point(point) => Some(point.setpoint()),
+            Aim::Roi(roi) => {
+                let yaw_now = || self.reference(YawFrame::Earth, situation).map(|kept| kept.yaw.at);
+                roi.direction(yaw_now).map(|direction| direction.setpoint())
             }
         }
     }
@@ -301,6 +364,11 @@ impl Tracking {
         let frame = situation.device_frame(hold);
         adapt::to_device(setpoint, frame, situation.heading, &situation.capabilities.limits, yaw_now)
     }
+}
+
+/// Whether the gimbal is, or is to be, in the hands of its radio control because a client asked for that.
+fn is_handed_over(aim: &Aim) -> bool {
+    matches!(aim, Aim::Point(Point { radio_control: RadioControl::Exclusive, .. }))
 }
 
 fn neutral(capabilities: &Capabilities) -> Aim {

@@ -99,6 +99,28 @@ pub mod command {
     pub const REQUEST_AUTOPILOT_CAPABILITIES: u16 = 520;
     pub const DO_GIMBAL_MANAGER_PITCHYAW: u16 = 1000;
     pub const DO_GIMBAL_MANAGER_CONFIGURE: u16 = 1001;
+    /// `MAV_CMD_DO_GIMBAL_MANAGER_TRACK_RECTANGLE` until 2020; no id of today.
+    pub const DO_GIMBAL_MANAGER_TRACK_RECTANGLE: u16 = 1002;
+    pub const REQUEST_OPERATOR_CONTROL: u16 = 32_100;
+    pub const GIMBAL_RESET: u16 = 42_501;
+}
+
+/// `MAV_MOUNT_MODE`.
+pub mod mount_mode {
+    pub const RETRACT: u8 = 0;
+    pub const NEUTRAL: u8 = 1;
+    pub const MAVLINK_TARGETING: u8 = 2;
+    pub const RC_TARGETING: u8 = 3;
+    pub const GPS_POINT: u8 = 4;
+    pub const SYSID_TARGET: u8 = 5;
+    pub const HOME_LOCATION: u8 = 6;
+    pub const WPNEXT_OFFSET: u8 = 7;
+}
+
+/// `MAV_ROI`.
+pub mod mav_roi {
+    pub const NONE: u8 = 0;
+    pub const LOCATION: u8 = 3;
 }
 
 /// `MAV_RESULT`, the answer in a `COMMAND_ACK`.

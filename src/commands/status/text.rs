@@ -180,10 +180,13 @@ fn setpoint(setpoint: &SetpointSnapshot) -> String {
         Some("vehicle") => text.push_str(" from the nose"),
         Some(_) | None => {}
     }
-    match &setpoint.source {
-        Some(source) => format!("{text}  by {source}"),
-        None => text,
+    if let Some(source) = &setpoint.source {
+        text = format!("{text}  by {source}");
     }
+    if setpoint.stale {
+        text.push_str("  held: the vehicle's position or heading is missing");
+    }
+    text
 }
 
 /// Columns as wide as their widest cell; the last is left as it is.

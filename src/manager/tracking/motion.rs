@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::situation::{Pose, Situation};
 use crate::geometry::{Angle, AngularRate, Yaw, YawFrame};
-use crate::gimbals::setpoint::{Stabilised, Turning};
+use crate::gimbals::setpoint::{Pointing, RadioControl, Setpoint, Stabilised, Turning};
 use crate::timestamp::Timestamp;
 
 /// After a rotation was stopped the gimbal gets so long to come to rest; then its attitude is held.
@@ -27,6 +27,7 @@ pub(super) struct Point {
     pub(super) yaw: Axis,
     pub(super) frame: YawFrame,
     pub(super) stabilised: Stabilised,
+    pub(super) radio_control: RadioControl,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,15 +51,13 @@ pub(super) enum Motion {
 }
 
 pub(super) fn is_zero(turning: &Turning) -> bool {
-    [turning.roll.unwrap_or(AngularRate::ZERO), turning.pitch, turning.yaw]
-        .iter()
-        .all(|rate| rate.radians_per_second() == 0.0)
+    [turning.roll.unwrap_or(AngularRate::ZERO), turning.pitch, turning.yaw].iter().all(|rate| rate.is_zero())
 }
 
 impl Turn {
     /// The same rotation as angles that move, from where the gimbal is.
     pub(super) fn in_angles(&self, pose: Pose) -> Point {
-        let Turning { pitch, yaw, yaw_frame, stabilised, .. } = self.turning;
+        let Turning { pitch, yaw, yaw_frame, stabilised, radio_control, .. } = self.turning;
         let turning = |at, rate| Axis { at, motion: Motion::Turning { rate, until: self.stops_at } };
         Point {
             roll: Axis::still(Angle::ZERO),
@@ -66,6 +65,7 @@ impl Turn {
             yaw: turning(pose.yaw, yaw),
             frame: yaw_frame,
             stabilised,
+            radio_control,
         }
     }
 
@@ -89,7 +89,23 @@ impl Point {
             yaw: Axis::still(pose.yaw),
             frame,
             stabilised,
+            radio_control: RadioControl::Off,
         }
+    }
+
+    /// Whether an axis is on its way.
+    pub(super) fn moves(&self) -> bool {
+        [self.roll, self.pitch, self.yaw].iter().any(|axis| axis.motion != Motion::Still)
+    }
+
+    pub(super) fn setpoint(&self) -> Setpoint {
+        Setpoint::Point(Pointing {
+            roll: self.roll.at,
+            pitch: self.pitch.at,
+            yaw: Yaw::new(self.frame, self.yaw.at),
+            stabilised: self.stabilised,
+            radio_control: self.radio_control,
+        })
     }
 }
 
@@ -98,13 +114,20 @@ impl Axis {
         Self { at, motion: Motion::Still }
     }
 
-    /// True when a rate has just ended by itself.
-    pub(super) fn carry_on(&mut self, now: Timestamp, passed: Duration, clamp: impl Fn(Angle) -> Angle) -> bool {
+    /// Moves by the time that has `passed`; `way` leads from one angle to another, `clamp` keeps off the end stops. True when a rate
+    /// has just ended by itself.
+    pub(super) fn carry_on(
+        &mut self,
+        now: Timestamp,
+        passed: Duration,
+        way: impl Fn(Angle, Angle) -> Angle,
+        clamp: impl Fn(Angle) -> Angle,
+    ) -> bool {
         match self.motion {
             Motion::Still => {}
             Motion::Slew { to, rate } => {
                 let step = rate.over(passed);
-                let left = to - self.at;
+                let left = way(self.at, to);
                 if left.abs() <= step {
                     *self = Self::still(to);
                 } else {
@@ -124,14 +147,26 @@ impl Axis {
 }
 
 /// Keeps a moving yaw within the end stops, which are the vehicle's also while North is held.
-pub(super) fn clamp_yaw(angle: Angle, frame: YawFrame, heading: Option<Angle>, situation: &Situation<'_>) -> Angle {
+pub(super) fn clamp_yaw(angle: Angle, frame: YawFrame, situation: &Situation<'_>) -> Angle {
     let Some(limits) = situation.capabilities.limits.yaw else { return angle };
-    let Some(Yaw::InVehicleFrame(vehicle)) = Yaw::new(frame, angle).in_frame(YawFrame::Vehicle, heading) else {
-        return angle;
-    };
+    let Some(vehicle) = vehicle_yaw(angle, frame, situation.heading) else { return angle };
     if vehicle >= limits.min() && vehicle <= limits.max() {
         return angle;
     }
     let stopped = Yaw::InVehicleFrame(limits.clamp(vehicle));
-    stopped.in_frame(frame, heading).map_or(angle, Yaw::angle)
+    stopped.in_frame(frame, situation.heading).map_or(angle, Yaw::angle)
+}
+
+/// The way round from one yaw to another: the short one, or the one that has no end stop in between.
+pub(super) fn way(from: Angle, to: Angle, frame: YawFrame, situation: &Situation<'_>) -> Angle {
+    let vehicle = |angle| vehicle_yaw(angle, frame, situation.heading);
+    match (vehicle(from), vehicle(to)) {
+        (Some(from), Some(to)) => situation.capabilities.limits.clamp_yaw(to, from) - from,
+        _ => (to - from).wrapped(),
+    }
+}
+
+/// A yaw from the nose. Only there turns count, so an angle that is from the nose already keeps them.
+fn vehicle_yaw(angle: Angle, frame: YawFrame, heading: Option<Angle>) -> Option<Angle> {
+    Yaw::new(frame, angle).in_frame(YawFrame::Vehicle, heading).map(Yaw::angle)
 }

@@ -1,23 +1,28 @@
 //! From a demand to an aim: which frame it is in, which axes it leaves out, what the gimbal can do.
+//!
+//! A demand of zero rates and no angles stops what moves: a rotation, an angle approached at a rate, a region of interest.
+//! It ends no angle, no neutral and no retract, however long ago they were asked for: some clients stream zero rates
+//! while nobody touches the stick, and a last one often arrives behind the command that was meant to follow it.
 
-use super::motion::{Axis, Motion, Point, Turn, is_zero};
+use super::motion::{Axis, Motion, Point, Turn, clamp_yaw, is_zero};
 use super::situation::Situation;
 use super::{Aim, RateTimeouts, Tracking, neutral};
 use crate::geometry::{Angle, AngularRate, Yaw, YawFrame};
 use crate::gimbals::adapt;
-use crate::gimbals::setpoint::{Setpoint, Stabilised, Turning, yaw_frame};
+use crate::gimbals::setpoint::{RadioControl, Setpoint, Stabilised, Turning, yaw_frame};
 use crate::manager::request::{AxisDemand, Demand, DemandKind, Refusal};
 use crate::timestamp::Timestamp;
 use crate::wire::ids::{CapFlags, GimbalFlags};
 
 impl Tracking {
+    /// `None` for a demand that changes nothing.
     pub(super) fn read_demand(
         &self,
         now: Timestamp,
         demand: &Demand,
         situation: &Situation<'_>,
         timeouts: RateTimeouts,
-    ) -> Result<Aim, Refusal> {
+    ) -> Result<Option<Aim>, Refusal> {
         let capabilities = situation.capabilities;
         let flags = demand.flags;
         if flags.intersects(GimbalFlags::RC_EXCLUSIVE | GimbalFlags::RC_MIXED)
@@ -29,18 +34,12 @@ impl Tracking {
             if !capabilities.flags.contains(CapFlags::HAS_RETRACT) {
                 return Err(Refusal::denied("cannot_retract"));
             }
-            return Ok(Aim::Retract);
+            return Ok(Some(Aim::Retract));
         }
         if flags.contains(GimbalFlags::NEUTRAL) {
-            return Ok(neutral(capabilities));
+            return Ok(Some(neutral(capabilities)));
         }
         let numbers = yaw_frame(flags).ok_or(Refusal::denied("both_yaw_frames"))?;
-        let hold = if flags.intersects(GimbalFlags::YAW_LOCK | GimbalFlags::YAW_IN_EARTH_FRAME) {
-            YawFrame::Earth
-        } else {
-            YawFrame::Vehicle
-        };
-        self.need_frame(hold, situation)?;
         let wanted =
             Stabilised { roll: flags.contains(GimbalFlags::ROLL_LOCK), pitch: flags.contains(GimbalFlags::PITCH_LOCK) };
         let stabilised = adapt::stabilised(wanted, capabilities.flags);
@@ -51,7 +50,34 @@ impl Tracking {
         let [roll, pitch, yaw] = [demand.roll, demand.pitch, demand.yaw].map(AxisDemand::without_zero_limit);
         let any_angle = [roll, pitch, yaw].iter().any(|axis| axis.angle.is_some());
         let any_rate = [roll, pitch, yaw].iter().any(|axis| axis.rate.is_some());
-        if any_rate && !any_angle && situation.device_frame(hold) == hold {
+        let by_rates = any_rate && !any_angle;
+        let stops = by_rates && [roll, pitch, yaw].iter().all(|axis| axis.rate.is_none_or(|rate| rate.is_zero()));
+        let mut hold = if flags.intersects(GimbalFlags::YAW_LOCK | GimbalFlags::YAW_IN_EARTH_FRAME) {
+            YawFrame::Earth
+        } else {
+            YawFrame::Vehicle
+        };
+        if let Err(refusal) = self.need_frame(hold, situation) {
+            // To stop takes no heading.
+            if !stops {
+                return Err(refusal);
+            }
+            hold = situation.device_frame(hold);
+        }
+        let reference = self.reference(hold, situation);
+        let stands = match &self.aim {
+            Aim::Retract | Aim::Neutral => true,
+            Aim::Turn(turn) => is_zero(&turn.turning) && turn.turning.yaw_frame == hold,
+            Aim::Point(point) => !point.moves() && reference.is_none(),
+            Aim::Idle | Aim::Roi(_) => false,
+        };
+        if stops && stands {
+            return Ok(None);
+        }
+        let radio_control = RadioControl::of_flags(flags);
+        let stops_angles = stops && matches!(self.aim, Aim::Point(_)) && reference.is_some();
+        let keeps_angles = stops_angles || radio_control == RadioControl::Exclusive;
+        if by_rates && !keeps_angles && situation.device_frame(hold) == hold {
             let rate = |axis: AxisDemand| axis.rate.unwrap_or(AngularRate::ZERO);
             let has_roll = capabilities.flags.contains(CapFlags::HAS_ROLL_AXIS);
             let turning = Turning {
@@ -60,19 +86,25 @@ impl Tracking {
                 yaw: rate(yaw),
                 yaw_frame: hold,
                 stabilised,
+                radio_control,
             };
             let mut turn = Turn { turning, stops_at: until, settles_at: None };
             if is_zero(&turn.turning) {
                 turn.stop(now);
             }
-            return Ok(Aim::Turn(turn));
+            return Ok(Some(Aim::Turn(turn)));
         }
-        let reference = self.reference(hold, situation);
         let missing = Refusal::later("no_attitude");
+        if radio_control == RadioControl::Exclusive {
+            let kept = reference.ok_or(missing)?;
+            let [roll, pitch, yaw] = [kept.roll, kept.pitch, kept.yaw].map(|axis| Axis::still(axis.at));
+            return Ok(Some(Aim::Point(Point { roll, pitch, yaw, stabilised, radio_control, ..kept })));
+        }
         let yaw_angle = match yaw.angle {
             Some(angle) => {
                 let yaw = Yaw::new(numbers, angle).in_frame(hold, situation.heading);
-                Some(yaw.ok_or(Refusal::later("no_heading"))?.angle())
+                let angle = yaw.ok_or(Refusal::later("no_heading"))?.angle();
+                Some(if hold == YawFrame::Vehicle { clamp_yaw(angle, hold, situation) } else { angle })
             }
             None => None,
         };
@@ -84,8 +116,11 @@ impl Tracking {
             (Some(Axis { at, .. }), None) => Ok(at),
             (None, None) => Err(missing),
         };
-        // With rates alone an axis without one stands still; otherwise it keeps what it does.
-        let keep = |axis: Axis| if any_rate && !any_angle { Axis::still(axis.at) } else { axis };
+        // An axis left out goes on to its angle, and turns no further: rates are replaced on all axes at once (D7).
+        let keep = |axis: Axis| match axis.motion {
+            Motion::Slew { .. } if !by_rates => axis,
+            Motion::Still | Motion::Slew { .. } | Motion::Turning { .. } => Axis::still(axis.at),
+        };
         let axis = |wanted: AxisDemand, angle: Option<Angle>, reference: Option<Axis>, measured: Option<Angle>| match (
             angle,
             wanted.rate,
@@ -94,26 +129,30 @@ impl Tracking {
             (Some(to), Some(rate)) => {
                 Ok(Axis { at: begin(reference, measured)?, motion: Motion::Slew { to, rate: rate.abs() } })
             }
-            (None, Some(rate)) => Ok(Axis { at: begin(reference, measured)?, motion: Motion::Turning { rate, until } }),
-            (None, None) => Ok(keep(reference.ok_or(missing)?)),
+            (None, Some(rate)) if !rate.is_zero() => {
+                Ok(Axis { at: begin(reference, measured)?, motion: Motion::Turning { rate, until } })
+            }
+            (None, _) => Ok(keep(reference.ok_or(missing)?)),
         };
         let has_roll = capabilities.flags.contains(CapFlags::HAS_ROLL_AXIS);
         let level = Axis::still(Angle::ZERO);
-        Ok(Aim::Point(Point {
+        let limits = &capabilities.limits;
+        Ok(Some(Aim::Point(Point {
             roll: match roll.angle {
-                Some(angle) if has_roll => Axis::still(angle),
+                Some(angle) if has_roll => Axis::still(limits.clamp_roll(angle)),
                 _ => level,
             },
             pitch: axis(
                 pitch,
-                pitch.angle,
+                pitch.angle.map(|angle| limits.clamp_pitch(angle)),
                 reference.map(|reference| reference.pitch),
                 measured.map(|pose| pose.pitch),
             )?,
             yaw: axis(yaw, yaw_angle, reference.map(|reference| reference.yaw), measured.map(|pose| pose.yaw))?,
             frame: hold,
             stabilised,
-        }))
+            radio_control,
+        })))
     }
 
     /// Fails where the device needs its yaw in another frame than it is held in, and no heading is known.
@@ -131,7 +170,9 @@ impl Tracking {
             if point.frame == frame {
                 return Some(point);
             }
-            let yaw = Yaw::new(point.frame, point.yaw.at).in_frame(frame, situation.heading)?;
+            // From where the end stops let it look, which is what the picture shows.
+            let yaw = Yaw::new(point.frame, clamp_yaw(point.yaw.at, point.frame, situation));
+            let yaw = yaw.in_frame(frame, situation.heading)?;
             return Some(Point { yaw: Axis::still(yaw.angle()), frame, ..point });
         }
         if let (Aim::Roi(_), Some(Setpoint::Point(last))) = (&self.aim, self.last) {
@@ -142,6 +183,7 @@ impl Tracking {
                 yaw: Axis::still(yaw.angle()),
                 frame,
                 stabilised,
+                radio_control: RadioControl::Off,
             });
         }
         let pose = situation.measured_pose(frame)?;
@@ -152,7 +194,7 @@ impl Tracking {
 impl AxisDemand {
     /// A rate of exactly 0 beside an angle is a field left empty, not a limit that forbids moving.
     fn without_zero_limit(self) -> Self {
-        let rate = self.rate.filter(|rate| self.angle.is_none() || rate.radians_per_second() != 0.0);
+        let rate = self.rate.filter(|rate| self.angle.is_none() || !rate.is_zero());
         Self { rate, ..self }
     }
 }

@@ -4,6 +4,7 @@ use crate::geometry::{Angle, Position, YawFrame};
 use crate::gimbals::capabilities::Capabilities;
 use crate::gimbals::report::GimbalStatus;
 use crate::gimbals::settings::DeviceYawFrame;
+use crate::wire::ids::{CapFlags, GimbalFlags};
 
 /// What the tracking has to go by at one moment.
 #[derive(Clone, Copy, Debug)]
@@ -20,6 +21,13 @@ pub struct Situation<'a> {
 }
 
 impl Situation<'_> {
+    /// Whether the gimbal says that its own radio control has it and nobody else. Only one with such an input is
+    /// believed: others use that bit for something of their own.
+    pub(super) fn radio_control_has_it(&self) -> bool {
+        self.capabilities.flags.contains(CapFlags::HAS_RC_INPUTS)
+            && self.measured.is_some_and(|status| status.flags.contains(GimbalFlags::RC_EXCLUSIVE))
+    }
+
     /// The frame in which the device is told a yaw that is to be held in `frame`.
     pub(super) fn device_frame(&self, frame: YawFrame) -> YawFrame {
         match self.device_yaw_frame {

@@ -7,8 +7,13 @@ mod control;
 mod control_takeover;
 mod events;
 mod frames;
+mod mount;
 mod presence;
+mod rates;
+mod repeats;
+mod roi;
 mod setpoints;
+mod snooping;
 mod status;
 mod streams;
 
@@ -21,9 +26,10 @@ use gimbald::wire::dialect::{
 use gimbald::wire::ids::CapFlags;
 
 use crate::support::script::{
-    NAN, device_information, device_status, gimbal_heartbeat, ground_heartbeat, of, usual_capabilities,
+    NAN, device_information, device_status, gimbal_heartbeat, global_position, ground_heartbeat, of, px4_heartbeat,
+    usual_capabilities,
 };
-use crate::support::world::{Arrival, GCS, GIMBAL, MANAGER, Places, World, three_links};
+use crate::support::world::{AUTOPILOT, Arrival, GCS, GIMBAL, MANAGER, Places, World, three_links};
 
 const SECOND: Duration = Duration::from_secs(1);
 const COMPANION: MavId = MavId::new(1, 192);
@@ -61,6 +67,26 @@ fn run_looking(world: &mut World, places: Places, duration: Duration, pitch_deg:
         (SECOND, places.ground, GCS, ground_heartbeat()),
     ];
     world.run_with(duration, &repeated);
+}
+
+/// Degrees and metres above mean sea level.
+const FIELD: [f64; 3] = [47.397_742, 8.545_594, 488.0];
+
+/// The autopilot says where the vehicle is, 88 m above home, and that it looks to `heading_deg`.
+fn fly(world: &mut World, places: Places, at: [f64; 3], heading_deg: f64) {
+    world.send(places.autopilot, AUTOPILOT, &px4_heartbeat());
+    let position = global_position(world.now, at, 88.0);
+    world.send(places.autopilot, AUTOPILOT, &position);
+    frames::turn_vehicle(world, places, heading_deg);
+}
+
+/// Time passes while the gimbal and the ground station are there, and the vehicle is where it is.
+fn run_flying(world: &mut World, places: Places, duration: Duration, at: [f64; 3], heading_deg: f64) {
+    let end = world.now + duration;
+    while world.now < end {
+        fly(world, places, at, heading_deg);
+        run_looking(world, places, (SECOND / 10).min(end - world.now), 0.0, 0.0);
+    }
 }
 
 /// The setpoints that reached the gimbal; each must be well formed, and nobody else must have got one.

@@ -65,7 +65,8 @@ const GIMBAL: &[&str] = &[
     "rejected",
 ];
 const ATTITUDE: &[&str] = &["roll_deg", "pitch_deg", "yaw_vehicle_deg", "yaw_earth_deg", "age_ms"];
-const SETPOINT: &[&str] = &["mode", "pitch_deg", "yaw_deg", "yaw_frame", "pitch_rate_dps", "yaw_rate_dps", "source"];
+const SETPOINT: &[&str] =
+    &["mode", "pitch_deg", "yaw_deg", "yaw_frame", "pitch_rate_dps", "yaw_rate_dps", "source", "stale"];
 
 #[track_caller]
 fn assert_has(value: &Value, fields: &[&str]) {

@@ -8,7 +8,7 @@ use gimbald::wire::MavId;
 use gimbald::wire::dialect::{
     AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA, COMMAND_ACK_DATA, COMMAND_INT_DATA, COMMAND_LONG_DATA, CharArray,
     GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA, GIMBAL_MANAGER_SET_ATTITUDE_DATA,
-    GIMBAL_MANAGER_SET_MANUAL_CONTROL_DATA, GIMBAL_MANAGER_SET_PITCHYAW_DATA, MavMessage,
+    GIMBAL_MANAGER_SET_MANUAL_CONTROL_DATA, GIMBAL_MANAGER_SET_PITCHYAW_DATA, GLOBAL_POSITION_INT_DATA, MavMessage,
 };
 use gimbald::wire::ids::CapFlags;
 
@@ -20,6 +20,8 @@ pub const ACCEPTED: u8 = 0;
 pub const TEMPORARILY_REJECTED: u8 = 1;
 pub const DENIED: u8 = 2;
 pub const UNSUPPORTED: u8 = 3;
+pub const FAILED: u8 = 4;
+pub const UNSUPPORTED_MAV_FRAME: u8 = 9;
 
 /// What usual devices can do.
 pub fn usual_capabilities() -> CapFlags {
@@ -43,6 +45,11 @@ pub fn ground_heartbeat() -> MavMessage {
     heartbeat(6, 8)
 }
 
+/// A multicopter of ArduPilot.
+pub fn ardupilot_heartbeat() -> MavMessage {
+    heartbeat(2, 3)
+}
+
 /// A multicopter of PX4.
 pub fn px4_heartbeat() -> MavMessage {
     heartbeat(2, 12)
@@ -63,6 +70,57 @@ pub fn command_long(target: MavId, command: u16, params: &[f32]) -> MavMessage {
         target_system: target.system,
         target_component: target.component,
         confirmation: 0,
+    })
+}
+
+/// `DO_SET_ROI_LOCATION` as `COMMAND_INT` to the first manager for its device: degrees, and metres in `frame`.
+pub fn roi_location(frame: u8, [latitude, longitude]: [f64; 2], altitude: f32) -> MavMessage {
+    let scaled = |degrees: f64| (degrees * 1e7).round() as i32;
+    in_frame(frame, command_int(MANAGER, 195, [154.0, NAN, NAN, NAN], scaled(latitude), scaled(longitude), altitude))
+}
+
+/// The same command in another frame.
+pub fn in_frame(frame: u8, command: MavMessage) -> MavMessage {
+    match command {
+        MavMessage::COMMAND_INT(command) => MavMessage::COMMAND_INT(COMMAND_INT_DATA { frame, ..command }),
+        other => panic!("{other:?} has no frame"),
+    }
+}
+
+/// The same command to another component.
+pub fn to(target: MavId, command: MavMessage) -> MavMessage {
+    let (target_system, target_component) = (target.system, target.component);
+    match command {
+        MavMessage::COMMAND_INT(command) => {
+            MavMessage::COMMAND_INT(COMMAND_INT_DATA { target_system, target_component, ..command })
+        }
+        MavMessage::COMMAND_LONG(command) => {
+            MavMessage::COMMAND_LONG(COMMAND_LONG_DATA { target_system, target_component, ..command })
+        }
+        other => panic!("{other:?} is no command"),
+    }
+}
+
+/// The same command, sent `confirmation` times before.
+pub fn again(confirmation: u8, command: MavMessage) -> MavMessage {
+    match command {
+        MavMessage::COMMAND_LONG(command) => MavMessage::COMMAND_LONG(COMMAND_LONG_DATA { confirmation, ..command }),
+        other => panic!("{other:?} does not count"),
+    }
+}
+
+/// `GLOBAL_POSITION_INT` at degrees and metres above mean sea level, without a heading.
+pub fn global_position(at: Timestamp, [latitude, longitude, amsl]: [f64; 3], above_home: f64) -> MavMessage {
+    MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA {
+        time_boot_ms: at.boot_ms(),
+        lat: (latitude * 1e7).round() as i32,
+        lon: (longitude * 1e7).round() as i32,
+        alt: (amsl * 1e3).round() as i32,
+        relative_alt: (above_home * 1e3).round() as i32,
+        vx: 0,
+        vy: 0,
+        vz: 0,
+        hdg: u16::MAX,
     })
 }
 

@@ -3,14 +3,16 @@
 use gimbald::bridge::Input;
 use gimbald::timestamp::Timestamp;
 use gimbald::wire::MavId;
-use gimbald::wire::dialect::{COMMAND_ACK_DATA, COMMAND_LONG_DATA, HEARTBEAT_DATA, MavMessage};
+use gimbald::wire::dialect::{COMMAND_ACK_DATA, COMMAND_CANCEL_DATA, COMMAND_LONG_DATA, HEARTBEAT_DATA, MavMessage};
 
-use super::{SECOND, Setpoint, assert_near, look, only_setpoint, run_looking, with_gimbal};
+use super::frames::turn_vehicle;
+use super::{SECOND, Setpoint, assert_near, look, only_setpoint, run_looking, setpoints, with_gimbal};
 use crate::support::script::{
-    ACCEPTED, DENIED, NAN, UNSUPPORTED, ack, command_int, command_long, configure, ids, of, pitch_yaw_deg, pitchyaw,
-    request_message, set_attitude, set_pitchyaw, take_control,
+    ACCEPTED, DENIED, NAN, TEMPORARILY_REJECTED, UNSUPPORTED, ack, command_int, command_long, configure,
+    device_information, gimbal_heartbeat, ids, of, pitch_yaw_deg, pitchyaw, px4_heartbeat, request_message,
+    set_attitude, set_pitchyaw, take_control, to, usual_capabilities,
 };
-use crate::support::world::{GCS, MANAGER};
+use crate::support::world::{GCS, MANAGER, World, three_links};
 
 /// "When an unknown command is addressed exactly to S/191, ACK UNSUPPORTED is sent now with target = sender."
 /// Protocol checklist 129: "When an unknown command has target_component 0 or target 0/0, no ACK is sent."
@@ -25,6 +27,190 @@ fn items_128_and_129_an_unknown_command_is_answered_by_who_was_asked() {
         for target in [MavId::new(1, 0), MavId::new(0, 0), MavId::new(0, 191), MavId::new(9, 191)] {
             assert_eq!(world.ask(places.ground, GCS, &command_long(target, number, &[0.0; 7])), [], "{target}");
         }
+    }
+}
+
+/// Commands about gimbals and cameras that we do not carry out are refused by name to who addressed exactly us, in either
+/// form, and by silence to who asked everybody.
+/// Protocol checklist 138: "When 246 arrives with p4 = 0, the daemon does not reboot."
+/// Client checklist E120: "198: supported or UNSUPPORTED; never silence when addressed to M."
+#[test]
+#[rustfmt::skip]
+fn items_128_and_138_what_we_do_not_do_is_refused_by_name() {
+    let (mut world, places) = with_gimbal();
+    turn_vehicle(&mut world, places, 0.0);
+    let named = [
+        (196,    "do_set_roi_wpnext_offset_unsupported"),
+        (198,    "do_set_roi_sysid_unsupported"),
+        (201,    "do_set_roi_unsupported"),
+        (220,    "do_mount_control_quat_unsupported"),
+        (246,    "preflight_reboot_shutdown_unsupported"),
+        (1002,   "do_gimbal_manager_track_rectangle_unsupported"),
+        (32_100, "request_operator_control_unsupported"),
+        (42_501, "gimbal_reset_unsupported"),
+    ];
+    for (number, reason) in named {
+        for params in [[0.0; 7], [1.0; 7], [NAN; 7], [3.0, 0.0, 0.0, 0.0, 47.4, 8.5, 400.0]] {
+            let by_long = command_long(MANAGER, number, &params);
+            let by_int = command_int(MANAGER, number, [params[0]; 4], 474_000_000, 85_000_000, 400.0);
+            for command in [by_long, by_int] {
+                assert_eq!(world.result_of(places.ground, GCS, &command), Some(UNSUPPORTED), "{command:?}");
+                for target in [MavId::new(1, 0), MavId::new(0, 0)] {
+                    let to_everybody = world.ask(places.ground, GCS, &to(target, command.clone()));
+                    assert_eq!(to_everybody, [], "{target} {number}");
+                }
+            }
+        }
+        let rejected = world.snapshot().gimbals[0].rejected["255/190"].clone();
+        assert_eq!(rejected[reason], 8, "{rejected:?}");
+    }
+    assert_eq!(setpoints(&mut world, places), []);
+    assert_eq!(world.snapshot().gimbals[0].rejected["255/190"].len(), named.len());
+}
+
+/// "When COMMAND_CANCEL arrives and nothing runs, it is ignored."
+#[test]
+fn item_135_there_is_nothing_to_cancel() {
+    let (mut world, places) = with_gimbal();
+    for (target_system, target_component) in [(1, 191), (1, 0), (0, 0)] {
+        for command in [195, 512, 1000] {
+            let cancel = COMMAND_CANCEL_DATA { command, target_system, target_component };
+            assert_eq!(world.ask(places.ground, GCS, &MavMessage::COMMAND_CANCEL(cancel)), []);
+        }
+    }
+    assert_eq!(setpoints(&mut world, places), []);
+}
+
+/// D5: what another vehicle asks of everybody is not our business; what it asks of us alone is refused.
+/// A frame under our own id is nobody's request.
+#[test]
+fn others_who_are_no_clients_get_nothing_done() {
+    let (mut world, places) = with_gimbal();
+    let stranger = MavId::new(2, 1);
+    world.send(places.ground, stranger, &px4_heartbeat());
+    for command in [pitchyaw(-10.0, 0.0, NAN, NAN, 44.0), take_control(), command_long(MANAGER, 197, &[])] {
+        assert_eq!(world.result_of(places.ground, stranger, &command), Some(DENIED));
+        for target in [MavId::new(0, 0), MavId::new(1, 0)] {
+            let unnamed = match to(target, command.clone()) {
+                MavMessage::COMMAND_LONG(command) => {
+                    MavMessage::COMMAND_LONG(COMMAND_LONG_DATA { param7: 0.0, ..command })
+                }
+                other => other,
+            };
+            assert_eq!(world.ask(places.ground, stranger, &unnamed), [], "{target} {command:?}");
+        }
+        world.forget();
+        world.send(places.ground, MANAGER, &command);
+        assert!(world.take(places.ground).iter().all(|arrival| arrival.id() != 77));
+    }
+    assert_eq!(setpoints(&mut world, places), []);
+    assert_eq!(world.snapshot().gimbals[0].primary, None);
+}
+
+/// Parameter 7 of 512: "0: Flight-stack default, 1: address of requestor, 2: broadcast." First the answer to who asked.
+#[test]
+fn a_message_is_sent_to_whom_it_was_asked_for() {
+    let (mut world, places) = with_gimbal();
+    let other = world.open(2);
+    for (message_id, expected) in [(280.0, 280), (281.0, 281), (396.0, 396), (244.0, 244), (0.0, 0)] {
+        for (response_target, to_everybody) in [(0.0, false), (1.0, false), (2.0, true), (NAN, false), (7.0, false)] {
+            let params = [message_id, 281.0, 0.0, 0.0, 0.0, 0.0, response_target];
+            let answers = world.ask(places.ground, GCS, &command_long(MANAGER, 512, &params));
+            assert_eq!(ids(&answers), [77, expected], "{message_id} to {response_target}");
+            for elsewhere in [other, places.autopilot] {
+                let heard: Vec<u32> = ids(&world.take(elsewhere)).into_iter().filter(|id| *id != 76).collect();
+                assert_eq!(heard, if to_everybody { vec![expected] } else { vec![] }, "{message_id} {response_target}");
+            }
+        }
+    }
+}
+
+/// What 512 and 511 are answered by us, and by us among everybody. 283 and 285 are the device's, which is a component of its
+/// own; D23: "An unknown message id in a directed REQUEST_MESSAGE is DENIED".
+#[test]
+#[rustfmt::skip]
+fn requests_for_messages_have_their_answers() {
+    let (mut world, places) = with_gimbal();
+    let nobody = MavId::new(0, 0);
+    for (number, message_id, interval_us,     directed,       everybody) in [
+        (512,    283,        0.0,             Some(DENIED),   None),
+        (512,    285,        0.0,             Some(DENIED),   None),
+        (512,    148,        0.0,             Some(DENIED),   None),
+        (511,    281,        0.0,             Some(ACCEPTED), Some(ACCEPTED)),
+        (511,    281,        5_000_000.0,     Some(ACCEPTED), Some(ACCEPTED)),
+        (511,    281,        -1.0,            Some(ACCEPTED), Some(ACCEPTED)),
+        (511,    281,        1e30,            Some(ACCEPTED), Some(ACCEPTED)),
+        (511,    281,        NAN,             Some(ACCEPTED), Some(ACCEPTED)),
+        (511,    281,        -2.0,            Some(DENIED),   Some(DENIED)),
+        (511,    281,        -0.5,            Some(DENIED),   Some(DENIED)),
+        (511,    281,        f32::INFINITY,   Some(DENIED),   Some(DENIED)),
+        (511,    281,        f32::NEG_INFINITY, Some(DENIED), Some(DENIED)),
+        (511,    283,        0.0,             Some(DENIED),   None),
+        (511,    285,        100_000.0,       Some(DENIED),   None),
+        (511,    30,         100_000.0,       Some(DENIED),   None),
+        (511,    0,          0.0,             Some(DENIED),   None),
+    ] {
+        let command = command_long(MANAGER, number, &[message_id as f32, interval_us, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        assert_eq!(world.result_of(places.ground, GCS, &command), directed, "{number} {message_id} {interval_us}");
+        let result = world.result_of(places.ground, GCS, &to(nobody, command));
+        assert_eq!(result, everybody, "{number} {message_id} {interval_us}");
+        run_looking(&mut world, places, SECOND / 10, 0.0, 0.0);
+    }
+    let rejected = &world.snapshot().gimbals[0].rejected["255/190"];
+    assert_eq!((rejected["message_of_the_device"], rejected["heartbeat_is_fixed"]), (4, 1));
+}
+
+/// Client checklist E86: "1000 addressed to component 0 with p7 = 0: executed by every gimbal, one ACK per manager component."
+/// To component 0 with the id of one: that one's manager answers, and nobody else.
+#[test]
+fn client_item_e86_each_manager_answers_for_its_own_gimbal() {
+    let (mut world, places) = with_gimbal();
+    let second = MavId::new(1, 171);
+    world.send(places.gimbal, second, &gimbal_heartbeat());
+    let information = device_information(world.now, usual_capabilities());
+    world.send(places.gimbal, second, &MavMessage::GIMBAL_DEVICE_INFORMATION(information));
+    for (target, id, answering) in [
+        (0, 0.0, vec![191, 192]),
+        (0, NAN, vec![191, 192]),
+        (0, 154.0, vec![191]),
+        (0, 171.0, vec![192]),
+        (0, 99.0, vec![]),
+        (191, 0.0, vec![191]),
+        (192, 171.0, vec![192]),
+    ] {
+        for target_system in [0, 1] {
+            let target = MavId::new(target_system, target);
+            if target.component != 0 && target_system == 0 {
+                continue;
+            }
+            for number in [1000, 1001] {
+                let mut params = [-10.0, 0.0, NAN, NAN, 44.0, NAN, id];
+                if number == 1001 {
+                    params = [-1.0, -1.0, -1.0, -1.0, NAN, NAN, id];
+                }
+                let answers = world.ask(places.ground, GCS, &command_long(target, number, &params));
+                let acks = answers.iter().filter(|answer| answer.id() == 77);
+                let from: Vec<u8> = acks.map(|answer| answer.source().component).collect();
+                assert_eq!(from, answering, "{number} to {target} for {id}");
+                let told = world.take(places.gimbal).into_iter().filter(|arrival| arrival.id() == 284);
+                let told: Vec<u8> = told.map(|arrival| arrival.source().component).collect();
+                assert_eq!(told, if number == 1000 { answering.clone() } else { vec![] }, "{target} for {id}");
+            }
+        }
+    }
+}
+
+/// "command TEMPORARILY_REJECTED" while there is no device, also for an id: the gimbal may be that one when it comes.
+#[test]
+fn without_a_gimbal_commands_are_to_come_again() {
+    let (mut world, places) = World::empty(three_links());
+    for command in [
+        pitchyaw(-10.0, 0.0, NAN, NAN, 44.0),
+        command_long(MANAGER, 1000, &[-10.0, 0.0, NAN, NAN, 44.0, NAN, 0.0]),
+        command_long(MANAGER, 197, &[]),
+        command_long(MANAGER, 205, &[-10.0, 0.0, 0.0, NAN, NAN, NAN, 2.0]),
+    ] {
+        assert_eq!(world.result_of(places.ground, GCS, &command), Some(TEMPORARILY_REJECTED), "{command:?}");
     }
 }
 

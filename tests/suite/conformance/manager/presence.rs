@@ -13,11 +13,11 @@ use gimbald::wire::dialect::{
 };
 use gimbald::wire::ids::CapFlags;
 
-use super::{COMPANION, SECOND, look, run_looking, told_control, with_gimbal, with_gimbal_that};
+use super::{COMPANION, FIELD, SECOND, fly, look, run_looking, told_control, with_gimbal, with_gimbal_that};
 use crate::support::script::{
     ACCEPTED, DENIED, NAN, TEMPORARILY_REJECTED, ack, autopilot_state, command_int, command_long, device_information,
-    device_status, gimbal_heartbeat, ground_heartbeat, ids, of, pitchyaw, px4_heartbeat, request_message, set_interval,
-    usual_capabilities,
+    device_status, gimbal_heartbeat, ground_heartbeat, ids, of, pitchyaw, px4_heartbeat, request_message, roi_location,
+    set_interval, usual_capabilities,
 };
 use crate::support::world::{AUTOPILOT, Arrival, GCS, GIMBAL, MANAGER, Place, World, heartbeat, three_links};
 
@@ -393,8 +393,8 @@ fn client_item_e30_discovery_does_not_depend_on_who_is_first() {
     }
 }
 
-/// Client checklist E31: "280 has HAS_PITCH_AXIS, HAS_YAW_AXIS (as the device has) …, CAN_POINT_LOCATION_GLOBAL exactly if
-/// ROI is accepted." CAN_POINT_LOCATION_LOCAL is left out: nothing that we take is a local position.
+/// Client checklist E31: "280 has HAS_PITCH_AXIS, HAS_YAW_AXIS (as the device has), CAN_POINT_LOCATION_LOCAL whenever angles
+/// are accepted, CAN_POINT_LOCATION_GLOBAL exactly if ROI is accepted."
 /// Client checklist E32: "HAS_RETRACT set exactly if flag 1 works; HAS_YAW_LOCK exactly if lock works."
 /// Client checklist E33: "280's limits are radians, min ≤ max, finite."
 #[test]
@@ -412,13 +412,21 @@ fn client_items_e31_to_e33_the_information_says_what_works() {
         world.send(places.autopilot, AUTOPILOT, &px4_heartbeat());
         let state = autopilot_state(world.now, EVERYBODY, 30.0);
         world.send(places.autopilot, AUTOPILOT, &MavMessage::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE(state));
-        let answers = world.ask(places.ground, GCS, &request_message(MANAGER, 280));
-        let told: &GIMBAL_MANAGER_INFORMATION_DATA = &of(&answers)[0];
+        let told = |world: &mut World| {
+            let answers = world.ask(places.ground, GCS, &request_message(MANAGER, 280));
+            let told: Vec<GIMBAL_MANAGER_INFORMATION_DATA> = of(&answers);
+            told[0].clone()
+        };
+        let global = CapFlags::CAN_POINT_LOCATION_GLOBAL;
+        assert!(!CapFlags::from_bits_retain(told(&mut world).cap_flags).contains(global), "there is no position");
+        fly(&mut world, places, FIELD, 30.0);
+        let told = told(&mut world);
         let has = |flag: CapFlags| CapFlags::from_bits_retain(told.cap_flags).contains(flag);
 
         assert!(has(CapFlags::HAS_PITCH_AXIS));
         assert_eq!(has(CapFlags::HAS_YAW_AXIS), has_yaw);
-        assert!(has(CapFlags::CAN_POINT_LOCATION_GLOBAL) && !has(CapFlags::CAN_POINT_LOCATION_LOCAL));
+        assert!(has(CapFlags::CAN_POINT_LOCATION_LOCAL) && has(global));
+        assert_eq!(world.result_of(places.ground, GCS, &roi_location(0, [47.4, 8.5], 400.0)), Some(ACCEPTED));
         for (min, max) in
             [(told.roll_min, told.roll_max), (told.pitch_min, told.pitch_max), (told.yaw_min, told.yaw_max)]
         {

@@ -9,10 +9,10 @@ use gimbald::wire::dialect::{
 };
 use gimbald::wire::ids::CapFlags;
 
-use super::{SECOND, run_looking, told_control, with_gimbal};
+use super::{FIELD, SECOND, fly, frames, look, run_looking, told_control, with_gimbal};
 use crate::support::script::{
     ACCEPTED, DENIED, TEMPORARILY_REJECTED, ack, command_long, device_information, gimbal_heartbeat, ids, of,
-    request_message, set_interval, take_control, usual_capabilities,
+    request_message, roi_location, set_interval, take_control, usual_capabilities,
 };
 use crate::support::world::{Arrival, GCS, GIMBAL, MANAGER, Place, World, three_links};
 
@@ -33,8 +33,8 @@ fn items_40_and_41_the_information_follows_its_acknowledgement() {
         let information: Vec<GIMBAL_MANAGER_INFORMATION_DATA> = of(&answers);
         let expected = GIMBAL_MANAGER_INFORMATION_DATA {
             time_boot_ms: 600,
-            // What the device can do, and that it points at places and takes yaw from North.
-            cap_flags: usual_capabilities().bits() | (1 << 17) | (1 << 12),
+            // What the device can do, and that it takes angles, and yaw from North.
+            cap_flags: usual_capabilities().bits() | (1 << 16) | (1 << 12),
             roll_min: -0.5,
             roll_max: 0.5,
             pitch_min: -1.5,
@@ -220,6 +220,8 @@ fn item_54_limits_that_nobody_stated_are_finite() {
 
 /// "When device caps carry bits above 0x3FFFF, 280.cap_flags does not."
 /// Protocol checklist 56: "When the manager can compute ROI (position source configured), 280.cap_flags has 131072."
+/// Client checklist E31: "CAN_POINT_LOCATION_LOCAL whenever angles are accepted, CAN_POINT_LOCATION_GLOBAL exactly if ROI
+/// is accepted." So it is told again when the position comes, and when it is gone.
 #[test]
 fn items_55_and_56_the_capabilities_are_those_of_a_manager() {
     let (mut world, places) = World::empty(three_links());
@@ -230,8 +232,43 @@ fn items_55_and_56_the_capabilities_are_those_of_a_manager() {
 
     let announced: Vec<GIMBAL_MANAGER_INFORMATION_DATA> = world.take_messages(places.ground);
 
-    assert_eq!(announced[0].cap_flags & !0x3_ffff, 0);
-    assert_eq!(announced[0].cap_flags & 131_072, 131_072);
+    assert_eq!(announced[0].cap_flags, 0x1_ffff);
+    let roi = roi_location(0, [47.4, 8.5], 400.0);
+    for (millis, told) in [(1_000, true), (4_900, true), (200, false), (0, true)] {
+        if millis != 200 {
+            fly(&mut world, places, FIELD, 0.0);
+        }
+        look(&mut world, places, 0.0, 0.0);
+        run_looking(&mut world, places, Duration::from_millis(millis), 0.0, 0.0);
+        let heard: Vec<GIMBAL_MANAGER_INFORMATION_DATA> =
+            of(&world.ask(places.ground, GCS, &request_message(MANAGER, 280)));
+        assert_eq!(heard[0].cap_flags, if told { 0x3_ffff } else { 0x1_ffff }, "{millis}");
+        frames::turn_vehicle(&mut world, places, 0.0);
+        let accepted = world.result_of(places.ground, GCS, &roi) == Some(ACCEPTED);
+        assert_eq!(accepted, told, "{millis}");
+    }
+}
+
+/// "…and whenever its contents change" (protocol notes 1.2): 280 goes to everybody when the vehicle's position comes, and
+/// when it is not known any more.
+#[test]
+fn item_56_what_a_client_may_ask_for_is_told_when_it_changes() {
+    let (mut world, places) = with_gimbal();
+    let mut told = Vec::new();
+    for fixed in [false, true, true, false, false, true] {
+        for _ in 0..40 {
+            match fixed {
+                true => fly(&mut world, places, FIELD, 0.0),
+                false => frames::turn_vehicle(&mut world, places, 0.0),
+            }
+            run_looking(&mut world, places, SECOND / 10, 0.0, 0.0);
+        }
+        let heard = world.take(places.autopilot);
+        let heard = of::<GIMBAL_MANAGER_INFORMATION_DATA>(&heard);
+        told.push(heard.iter().map(|told| told.cap_flags & 131_072 != 0).collect::<Vec<_>>());
+        assert_eq!(world.take_messages::<GIMBAL_MANAGER_INFORMATION_DATA>(places.ground), heard);
+    }
+    assert_eq!(told, [vec![], vec![true], vec![], vec![], vec![false], vec![true]]);
 }
 
 /// "When control ownership changes, a 281 with the new owner is sent on all links now, besides the regular stream."

@@ -1,0 +1,106 @@
+//! What clients ask to be told: `REQUEST_MESSAGE` (512), `SET_MESSAGE_INTERVAL` (511), `GET_MESSAGE_INTERVAL` (510).
+//!
+//! 283 and 285 are the device's own, and whoever asks us for them is refused (D23: DENIED, since a client that reads
+//! UNSUPPORTED asks 25 times).
+
+use super::commands::Outcome;
+use super::messages::{self, Interval};
+use super::request::{Command, Refusal};
+use super::{GimbalManager, ManagerOutput, Sender, Surroundings};
+use crate::timestamp::Timestamp;
+use crate::wire::dialect::MavMessage;
+use crate::wire::ids::message;
+
+/// Parameter 7 of 512, "target address for requested message": broadcast. Anything else is answered where it was asked.
+const TO_EVERYBODY: f32 = 2.0;
+
+impl GimbalManager {
+    /// 280 before the gimbal is known is refused for now; nobody needs to be remembered, because every channel is told
+    /// as soon as it is known.
+    pub(super) fn request_message(
+        &mut self,
+        now: Timestamp,
+        sender: Sender,
+        command: &Command,
+        around: Surroundings<'_>,
+    ) -> Result<Outcome, Refusal> {
+        let to_everybody = command.param(7) == Some(TO_EVERYBODY);
+        let not_yet = Refusal::later("no_gimbal_yet");
+        let message = match message_id(command, 1) {
+            Some(message::GIMBAL_MANAGER_INFORMATION) => self.information(now, around).ok_or(not_yet)?,
+            Some(message::GIMBAL_MANAGER_STATUS) => self.status_message(now).ok_or(not_yet)?,
+            Some(message::COMPONENT_INFORMATION_BASIC) => Box::new(messages::component_information_basic(now)),
+            Some(message::MESSAGE_INTERVAL) => {
+                let id = message_id(command, 2).unwrap_or(u32::MAX);
+                Box::new(self.message_interval(sender, id))
+            }
+            Some(message::HEARTBEAT) if command.is_directed() => {
+                let channels = (!to_everybody).then(|| sender.channel.into());
+                self.outputs.push_back(ManagerOutput::Heartbeat { channels });
+                return Ok(Outcome::Accepted);
+            }
+            id => return not_ours(command, id),
+        };
+        self.outputs.push_back(if to_everybody {
+            ManagerOutput::Broadcast { channels: None, message }
+        } else {
+            ManagerOutput::Answer { channel: sender.channel, message }
+        });
+        Ok(Outcome::Accepted)
+    }
+
+    pub(super) fn set_message_interval(
+        &mut self,
+        now: Timestamp,
+        sender: Sender,
+        command: &Command,
+    ) -> Result<Outcome, Refusal> {
+        let micros = command.param(2).unwrap_or(0.0);
+        let schedule = match message_id(command, 1) {
+            Some(message::GIMBAL_MANAGER_STATUS) => &mut self.status_schedule,
+            Some(message::GIMBAL_MANAGER_INFORMATION) => &mut self.information_schedule,
+            id => return not_ours(command, id),
+        };
+        let set = schedule.set(now, sender.channel, micros);
+        set.map_err(|_| Refusal::denied("invalid_interval"))?;
+        Ok(Outcome::Accepted)
+    }
+
+    pub(super) fn get_message_interval(&mut self, sender: Sender, command: &Command) -> Outcome {
+        let id = message_id(command, 1).unwrap_or(u32::MAX);
+        let interval = self.message_interval(sender, id);
+        if !command.is_directed() && interval == messages::message_interval(id, Interval::NotAvailable) {
+            return Outcome::Ignored;
+        }
+        self.outputs.push_back(ManagerOutput::Answer { channel: sender.channel, message: Box::new(interval) });
+        Outcome::Accepted
+    }
+
+    fn message_interval(&self, sender: Sender, message_id: u32) -> MavMessage {
+        let interval = match message_id {
+            message::HEARTBEAT => Interval::Every(std::time::Duration::from_secs(1)),
+            message::GIMBAL_MANAGER_STATUS => self.status_schedule.interval(sender.channel),
+            message::GIMBAL_MANAGER_INFORMATION => self.information_schedule.interval(sender.channel),
+            _ => Interval::NotAvailable,
+        };
+        messages::message_interval(message_id, interval)
+    }
+}
+
+/// A message that others may have: refused to whoever asked exactly us.
+fn not_ours(command: &Command, message_id: Option<u32>) -> Result<Outcome, Refusal> {
+    if !command.is_directed() {
+        return Ok(Outcome::Ignored);
+    }
+    Err(Refusal::denied(match message_id {
+        Some(message::GIMBAL_DEVICE_INFORMATION | message::GIMBAL_DEVICE_ATTITUDE_STATUS) => "message_of_the_device",
+        Some(message::HEARTBEAT) => "heartbeat_is_fixed",
+        _ => "unknown_message",
+    }))
+}
+
+/// A parameter that is a message id; `None` where it can be none.
+fn message_id(command: &Command, number: usize) -> Option<u32> {
+    let id = command.param(number)?;
+    (id.fract() == 0.0 && (0.0..16_777_216.0).contains(&id)).then_some(id as u32)
+}

@@ -1,0 +1,230 @@
+//! The mount commands of gimbal protocol v1 (protocol notes 2.8).
+
+use gimbald::wire::MavId;
+use gimbald::wire::dialect::{COMMAND_ACK_DATA, MavMessage};
+use gimbald::wire::ids::CapFlags;
+
+use super::frames::turn_vehicle;
+use super::{
+    COMPANION, FIELD, assert_near, fly, is_nan, look, only_setpoint, setpoints, with_gimbal, with_gimbal_that,
+};
+use crate::support::script::{
+    ACCEPTED, DENIED, NAN, TEMPORARILY_REJECTED, UNSUPPORTED, ack, again, command_int, command_long, of, pitch_yaw_deg,
+    pitchyaw, take_control, to, usual_capabilities,
+};
+use crate::support::world::{AUTOPILOT, GCS, GIMBAL, MANAGER, World, three_links};
+
+/// "When DO_MOUNT_CONTROL (205) mode 2 with pitch −20 yaw 10 arrives from the primary, it acts as 1000(−20, 10, flags 44)."
+/// Client checklist E127: "205 with p7 = 2 and pitch/roll/yaw in p1/p2/p3: moves." Client checklist E128: "205 in mode 2
+/// without ACK interest: no harm from the ACK."
+#[test]
+fn client_items_e127_and_e128_angles_of_a_mount_are_those_of_a_gimbal() {
+    for command in [
+        control([-20.0, 0.0, 10.0], 2.0),
+        control([-20.0, NAN, 10.0], 2.0),
+        to(MavId::new(1, 0), control([-20.0, 0.0, 10.0], 2.0)),
+        command_int(MANAGER, 205, [-20.0, 0.0, 10.0, NAN], 0, i32::MAX, 2.0),
+    ] {
+        let mut told = Vec::new();
+        for command in [command, pitchyaw(-20.0, 10.0, NAN, NAN, 44.0)] {
+            let (mut world, places) = with_gimbal();
+            assert_eq!(world.result_of(places.ground, GCS, &take_control()), Some(ACCEPTED));
+            assert_eq!(world.result_of(places.ground, GCS, &command), Some(ACCEPTED), "{command:?}");
+            let setpoint = only_setpoint(&mut world, places);
+            assert!(is_nan(&[setpoint.angular_velocity_x, setpoint.angular_velocity_y, setpoint.angular_velocity_z]));
+            told.push((setpoint.q, setpoint.flags));
+        }
+        assert_eq!(told[0], told[1]);
+    }
+    // Roll has a parameter of its own.
+    let (mut world, places) = with_gimbal();
+    assert_eq!(world.result_of(places.ground, GCS, &control([-20.0, 8.0, NAN], 2.0)), Some(ACCEPTED));
+    let q = only_setpoint(&mut world, places).q.map(f64::from);
+    let roll = (2.0 * (q[2] * q[3] + q[0] * q[1])).asin();
+    assert_near(roll.to_degrees(), 8.0, 0.001);
+}
+
+/// What each mode does, in both commands.
+/// Client checklist E126: "204 and 205 addressed to M: handled (compatibility on) or UNSUPPORTED (off); never silence."
+#[test]
+#[rustfmt::skip]
+fn client_item_e126_each_mode_of_a_mount_has_its_answer() {
+    for (mode, result,      told,     reason) in [
+        (0.0,  ACCEPTED,    Some(1),  None),
+        (1.0,  ACCEPTED,    Some(2),  None),
+        (3.0,  UNSUPPORTED, None,     Some("mount_mode_rc_targeting_unsupported")),
+        (5.0,  UNSUPPORTED, None,     Some("mount_mode_sysid_target_unsupported")),
+        (6.0,  UNSUPPORTED, None,     Some("mount_mode_home_location_unsupported")),
+        (7.0,  UNSUPPORTED, None,     Some("mount_mode_wpnext_offset_unsupported")),
+        (8.0,  DENIED,      None,     Some("unknown_mount_mode")),
+        (256.0, DENIED,     None,     Some("unknown_mount_mode")),
+        (-1.0, DENIED,      None,     Some("unknown_mount_mode")),
+        (1.5,  DENIED,      None,     Some("unknown_mount_mode")),
+        (NAN,  DENIED,      None,     Some("unknown_mount_mode")),
+        (f32::INFINITY, DENIED, None, Some("unknown_mount_mode")),
+    ] {
+        for command in [again(1, configure_mount(mode, [0.0; 3])), control([-20.0, 0.0, 10.0], mode)] {
+            let (mut world, places) = with_gimbal();
+            assert_eq!(world.result_of(places.ground, GCS, &command), Some(result), "{command:?}");
+            let flags: Vec<u16> = setpoints(&mut world, places).iter().map(|(_, setpoint)| setpoint.flags).collect();
+            assert_eq!(flags, told.map(|flag| flag | 44).into_iter().collect::<Vec<_>>());
+            let rejected = world.snapshot().gimbals[0].rejected.get("255/190").cloned().unwrap_or_default();
+            assert_eq!(rejected.keys().map(String::as_str).collect::<Vec<_>>(), reason.into_iter().collect::<Vec<_>>());
+        }
+    }
+    // A gimbal that cannot retract says so, here as there.
+    let mut capabilities = usual_capabilities();
+    capabilities.set(CapFlags::HAS_RETRACT, false);
+    let (mut world, places) = with_gimbal_that(capabilities, three_links());
+    assert_eq!(world.result_of(places.ground, GCS, &control([0.0; 3], 0.0)), Some(DENIED));
+}
+
+/// "DO_MOUNT_CONFIGURE: p5/p6/p7 input mode roll/pitch/yaw: 0 angle body frame, 1 angular rate, 2 angle absolute", each
+/// sender for itself.
+#[test]
+fn the_inputs_of_a_mount_are_what_their_sender_configured() {
+    let (mut world, places) = with_gimbal();
+    turn_vehicle(&mut world, places, 30.0);
+    look(&mut world, places, 0.0, 0.0);
+    let absolute_yaw = configure_mount(2.0, [0.0, 0.0, 2.0]);
+    assert_eq!(world.result_of(places.ground, GCS, &absolute_yaw), Some(ACCEPTED));
+    assert_eq!(setpoints(&mut world, places), [], "to configure moves nothing");
+
+    for (sender, yaw) in [(GCS, 10.0), (COMPANION, 40.0)] {
+        assert_eq!(world.result_of(places.ground, sender, &control([-20.0, 0.0, 40.0], 2.0)), Some(ACCEPTED));
+        let setpoint = only_setpoint(&mut world, places);
+        assert_near(pitch_yaw_deg(setpoint.q).1, yaw, 0.001);
+    }
+
+    // Pitch and yaw as rates, by either form.
+    for rates in [configure_mount(2.0, [0.0, 1.0, 1.0]), command_int(MANAGER, 204, [2.0, 1.0, 1.0, 1.0], 0, 1, 1.0)] {
+        assert_eq!(world.result_of(places.ground, GCS, &rates), Some(ACCEPTED));
+        assert_eq!(world.result_of(places.ground, GCS, &control([-20.0, NAN, 40.0], 2.0)), Some(ACCEPTED));
+        let setpoint = only_setpoint(&mut world, places);
+        assert!(is_nan(&setpoint.q));
+        assert_near(setpoint.angular_velocity_y.into(), (-20.0_f64).to_radians(), 1e-6);
+        assert_near(setpoint.angular_velocity_z.into(), 40.0_f64.to_radians(), 1e-6);
+        assert_eq!(setpoint.flags, 44);
+        let back = configure_mount(2.0, [0.0, NAN, 7.0]);
+        assert_eq!(world.result_of(places.ground, GCS, &back), Some(ACCEPTED));
+        assert_eq!(world.result_of(places.ground, GCS, &control([-20.0, NAN, 40.0], 2.0)), Some(ACCEPTED));
+        assert_near(pitch_yaw_deg(only_setpoint(&mut world, places).q).1, 40.0, 0.001);
+    }
+}
+
+/// "ArduPilot refuses |pitch| > 90, |roll| > 180, |yaw| > 360": a number beyond that comes from a sender of centidegrees.
+#[test]
+fn angles_that_look_like_centidegrees_are_denied() {
+    let (mut world, places) = with_gimbal();
+    for (angles, result) in [
+        ([-90.0, 180.0, 360.0], ACCEPTED),
+        ([-90.5, 0.0, 0.0], DENIED),
+        ([0.0, -181.0, 0.0], DENIED),
+        ([0.0, 0.0, 361.0], DENIED),
+        ([-2_000.0, 0.0, 1_000.0], DENIED),
+    ] {
+        assert_eq!(world.result_of(places.ground, GCS, &control(angles, 2.0)), Some(result), "{angles:?}");
+    }
+    let rejected = &world.snapshot().gimbals[0].rejected["255/190"];
+    assert_eq!((rejected.len(), rejected["looks_like_centidegrees"]), (1, 4));
+    assert_eq!(world.result_of(places.ground, GCS, &control([f32::INFINITY, 0.0, 0.0], 2.0)), Some(DENIED));
+    assert_eq!(world.snapshot().gimbals[0].rejected["255/190"]["infinite_number"], 1);
+}
+
+/// "205 p7 = 4: p4 altitude m above home, p5/p6 in degrees, or in degE7 when either is beyond 360."
+/// Client checklist E127: "With p7 = 4, p5/p6 as 474000000.0: degE7 recognised."
+#[test]
+fn client_item_e127_a_place_for_a_mount_comes_in_either_unit() {
+    for (command, tolerance) in [
+        (place(50.0, 47.4, 8.55), 1e-5),
+        (place(50.0, 474_000_000.0, 85_500_000.0), 1e-5),
+        (command_int(MANAGER, 205, [NAN, NAN, NAN, 50.0], 474_000_000, 85_500_000, 4.0), 1e-9),
+    ] {
+        let (mut world, places) = with_gimbal();
+        assert_eq!(world.result_of(places.ground, GCS, &command), Some(TEMPORARILY_REJECTED), "no position yet");
+        fly(&mut world, places, FIELD, 0.0);
+        assert_eq!(world.result_of(places.ground, GCS, &command), Some(ACCEPTED), "{command:?}");
+        let roi = world.snapshot().gimbals[0].roi.clone().expect("a place");
+        assert_near(roi.latitude_deg, 47.4, tolerance);
+        assert_near(roi.longitude_deg, 8.55, tolerance);
+        // Home is 400 m above the sea.
+        assert_near(roi.altitude_amsl_m, 450.0, 1e-6);
+        assert_eq!(world.result_of(places.ground, GCS, &place(0.0, 0.0, 0.0)), Some(ACCEPTED));
+        assert_eq!(world.snapshot().gimbals[0].roi, None);
+    }
+    let (mut world, places) = with_gimbal();
+    let mode = configure_mount(4.0, [0.0; 3]);
+    assert_eq!(world.result_of(places.ground, GCS, &mode), Some(TEMPORARILY_REJECTED));
+    fly(&mut world, places, FIELD, 0.0);
+    assert_eq!(world.result_of(places.ground, GCS, &mode), Some(ACCEPTED), "the place is yet to come");
+    let nan_as_integer = 0x7ff8_0000;
+    for command in [
+        place(50.0, 91.0, 8.5),
+        place(50.0, 474_000_000.0, 8_500_000_000.0),
+        place(NAN, 47.4, 8.5),
+        place(50.0, NAN, 8.5),
+        place(50.0, f32::INFINITY, 8.5),
+        command_int(MANAGER, 205, [NAN, NAN, NAN, 50.0], i32::MAX, 85_500_000, 4.0),
+        command_int(MANAGER, 205, [NAN, NAN, NAN, 50.0], nan_as_integer, nan_as_integer, 4.0),
+    ] {
+        assert_eq!(world.result_of(places.ground, GCS, &command), Some(DENIED), "{command:?}");
+    }
+    assert_eq!(world.snapshot().gimbals[0].roi, None);
+}
+
+/// D5: "one gate for v2 messages, v2 commands, v1 commands, ROI".
+#[test]
+fn mount_commands_pass_the_gate() {
+    let (mut world, places) = with_gimbal();
+    assert_eq!(world.result_of(places.ground, GCS, &take_control()), Some(ACCEPTED));
+    let commands = [
+        configure_mount(0.0, [0.0; 3]),
+        configure_mount(2.0, [0.0; 3]),
+        control([-20.0, 0.0, 10.0], 2.0),
+        place(50.0, 47.4, 8.5),
+    ];
+    for command in &commands {
+        assert_eq!(world.result_of(places.autopilot, COMPANION, command), Some(DENIED), "{command:?}");
+    }
+    assert_eq!(setpoints(&mut world, places), []);
+    assert_eq!(world.snapshot().gimbals[0].rejected["1/192"]["not_in_control"], commands.len() as u64);
+}
+
+/// To everybody they are for us too; what the autopilot says to every mount is how it drives one, and what is said to the
+/// device is kept from it (D10). Neither moves anything.
+#[test]
+fn mount_commands_for_others_move_nothing() {
+    let (mut world, places) = with_gimbal();
+    turn_vehicle(&mut world, places, 0.0);
+    let command = control([-20.0, 0.0, 10.0], 2.0);
+    for target in [MavId::new(1, 0), MavId::new(0, 0)] {
+        let answers = world.ask(places.ground, GCS, &to(target, command.clone()));
+        assert_eq!(of::<COMMAND_ACK_DATA>(&answers), [ack(GCS, 205, ACCEPTED)]);
+        assert_eq!(setpoints(&mut world, places).len(), 1, "{target}");
+        assert_eq!(world.ask(places.autopilot, AUTOPILOT, &to(target, command.clone())), [], "{target}");
+        assert_eq!(setpoints(&mut world, places), []);
+    }
+    for target in [GIMBAL, AUTOPILOT, MavId::new(2, 191)] {
+        assert_eq!(told(&mut world, places.ground, &to(target, command.clone())), Vec::<u8>::new(), "{target}");
+        assert_eq!(setpoints(&mut world, places), [], "{target}");
+    }
+}
+
+fn told(world: &mut World, from: crate::support::world::Place, command: &MavMessage) -> Vec<u8> {
+    of::<COMMAND_ACK_DATA>(&world.ask(from, GCS, command)).into_iter().map(|ack| ack.result).collect()
+}
+
+/// `DO_MOUNT_CONTROL` with pitch, roll and yaw.
+fn control([pitch, roll, yaw]: [f32; 3], mode: f32) -> MavMessage {
+    command_long(MANAGER, 205, &[pitch, roll, yaw, NAN, NAN, NAN, mode])
+}
+
+/// `DO_MOUNT_CONTROL` with a place.
+fn place(altitude: f32, latitude: f32, longitude: f32) -> MavMessage {
+    command_long(MANAGER, 205, &[NAN, NAN, NAN, altitude, latitude, longitude, 4.0])
+}
+
+/// `DO_MOUNT_CONFIGURE` with the inputs of roll, pitch and yaw.
+fn configure_mount(mode: f32, [roll, pitch, yaw]: [f32; 3]) -> MavMessage {
+    command_long(MANAGER, 204, &[mode, 1.0, 1.0, 1.0, roll, pitch, yaw])
+}
