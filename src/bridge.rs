@@ -28,7 +28,6 @@ mod transactions;
 
 pub use crate::channel::{ChannelId, ChannelSet};
 use crate::gimbals::DriverOutput;
-use crate::manager::events::Event;
 use crate::manager::rank::Ranks;
 use crate::manager::{ManagerOutput, Surroundings, messages};
 use crate::router::Router;
@@ -38,13 +37,13 @@ use crate::vehicle::Vehicle;
 use crate::wire::dialect::MavMessage;
 use crate::wire::ids::{component, mav_state};
 use crate::wire::{DatagramFrames, FrameBuffer, MavId, StreamDecoder};
-use announcements::{Announcement, Announcements, Subject};
+use announcements::Announcements;
 use channels::Channels;
 use conflicts::{Conflict, Conflicts};
 use events::Events;
 use identity::Identity;
 use outbox::Outbox;
-use roster::{Gimbal, GimbalOutput, Roster};
+use roster::{GimbalOutput, Roster};
 use settings::{FALLBACK_SYSTEM_ID, Role, Settings};
 use stations::Stations;
 use streams::AutopilotStreams;
@@ -495,30 +494,6 @@ impl Bridge {
         }
     }
 
-    /// An event is remembered, and said where the pilot must know it.
-    fn handle_event(&mut self, now: Timestamp, at: usize, event: Event) {
-        let gimbal = self.roster.get_mut(at);
-        let (component, subject) = (gimbal.component, subject(gimbal));
-        self.events.note(now, subject.name, event);
-        let announcement = self.announcements.handle_event(now, subject, &event);
-        self.announce(now, component, announcement);
-        self.announce_state(now, at);
-    }
-
-    fn announce_state(&mut self, now: Timestamp, at: usize) {
-        let gimbal = self.roster.get_mut(at);
-        let (component, state, subject) = (gimbal.component, gimbal.manager.state(), subject(gimbal));
-        let announcement = self.announcements.handle_state(now, subject, state);
-        self.announce(now, component, announcement);
-    }
-
-    /// To everybody but gimbals, which have no use for it.
-    fn announce(&mut self, now: Timestamp, component: u8, announcement: Option<Announcement>) {
-        let Some(Announcement { severity, text }) = announcement else { return };
-        let channels = self.channels.open_set().without(self.channels.with_role(Role::Gimbal));
-        self.send(now, channels, component, &messages::status_text(severity, &text));
-    }
-
     fn channels_of_device(&self, device: MavId) -> ChannelSet {
         self.roster.channel_of(device).map_or(ChannelSet::EMPTY, ChannelSet::from)
     }
@@ -563,10 +538,4 @@ impl Bridge {
 
 fn surroundings<'a>(vehicle: &'a Vehicle, autopilot: Option<MavId>, ranks: &'a Ranks) -> Surroundings<'a> {
     Surroundings { vehicle, autopilot, ranks, overheard: false, other_vehicle: false }
-}
-
-/// The gimbal as texts about it name it.
-fn subject(gimbal: &Gimbal) -> Subject<'_> {
-    let settings = gimbal.manager.settings();
-    Subject { manager: gimbal.component, name: &settings.name, takeover: settings.takeover }
 }

@@ -3,10 +3,15 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use super::Bridge;
 use super::allowance::Allowance;
+use super::announcements::{Announcement, Subject};
+use super::roster::Gimbal;
+use super::settings::Role;
 use super::snapshot::EventSnapshot;
 use crate::manager::control::Place;
 use crate::manager::events::Event;
+use crate::manager::messages;
 use crate::timestamp::Timestamp;
 
 /// So many events are remembered …
@@ -81,6 +86,39 @@ impl Events {
             self.entries.pop_front();
         }
     }
+}
+
+impl Bridge {
+    /// An event is remembered, and said where the pilot must know it.
+    pub(super) fn handle_event(&mut self, now: Timestamp, at: usize, event: Event) {
+        let gimbal = self.roster.get_mut(at);
+        let (component, subject) = (gimbal.component, subject(gimbal));
+        self.events.note(now, subject.name, event);
+        let announcement = self.announcements.handle_event(now, subject, &event);
+        self.announce(now, component, announcement);
+        self.announce_state(now, at);
+    }
+
+    /// Says that a gimbal is lost or back, if it is and there is room for it.
+    pub(super) fn announce_state(&mut self, now: Timestamp, at: usize) {
+        let gimbal = self.roster.get_mut(at);
+        let (component, state, subject) = (gimbal.component, gimbal.manager.state(), subject(gimbal));
+        let announcement = self.announcements.handle_state(now, subject, state);
+        self.announce(now, component, announcement);
+    }
+
+    /// To everybody but gimbals, which have no use for it.
+    fn announce(&mut self, now: Timestamp, component: u8, announcement: Option<Announcement>) {
+        let Some(Announcement { severity, text }) = announcement else { return };
+        let channels = self.channels.open_set().without(self.channels.with_role(Role::Gimbal));
+        self.send(now, channels, component, &messages::status_text(severity, &text));
+    }
+}
+
+/// The gimbal as texts about it name it.
+fn subject(gimbal: &Gimbal) -> Subject<'_> {
+    let settings = gimbal.manager.settings();
+    Subject { manager: gimbal.component, name: &settings.name, takeover: settings.takeover }
 }
 
 impl Entry {

@@ -136,7 +136,7 @@ fn refusal() -> EventSnapshot {
         from: Some("255/190".into()),
         to: None,
         reason: Some("not_in_control".into()),
-        text: "1/100 was refused: not in control; 255/190 is in control".into(),
+        text: "1/100 was refused: 255/190 is in control".into(),
     }
 }
 

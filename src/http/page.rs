@@ -8,8 +8,8 @@ const PAGE: &str = include_str!("page.html");
 /// Only the page's own style and script, each known by its SHA-256, and only its own origin may be asked: even if a
 /// name that a gimbal reports became markup, it could neither run nor load anything.
 const POLICY: &str = "default-src 'none'; \
-    style-src 'sha256-RU/i/GMqBqym+LVaNtN9RxPULVvEI8iHHfpN9VUJXLk='; \
-    script-src 'sha256-QNLe68UnONeQESd2bzkvmoptLZIH9TkGftz/ILO/Vog='; \
+    style-src 'sha256-qktgxO7X3SOGDQ7Tmtw4zR4SqhIYleK/DYmiXfhYbQE='; \
+    script-src 'sha256-qafmKUyR0EHJaVGutz0cLZgEr9RLD8F1s55U6PrkviE='; \
     connect-src 'self'; img-src data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 pub async fn page() -> impl IntoResponse {

@@ -81,7 +81,7 @@ fn status_is_the_whole_snapshot() {
             {
                 "id": 8, "at_s": 3725.25, "age_ms": 250, "first_at_s": 3700.0, "count": 12, "gimbal": "camera",
                 "what": "refused", "place": null, "who": "1/100", "from": "255/190", "to": null,
-                "reason": "not_in_control", "text": "1/100 was refused: not in control; 255/190 is in control",
+                "reason": "not_in_control", "text": "1/100 was refused: 255/190 is in control",
             },
             {
                 "id": 7, "at_s": 3664.0, "age_ms": 61_500, "first_at_s": 3664.0, "count": 1, "gimbal": "camera",

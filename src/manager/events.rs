@@ -127,9 +127,10 @@ impl Event {
         match *self {
             Self::Control(change) => describe_change(change),
             Self::Refused { who, reason, holder } => {
-                let reason = reason.replace('_', " ");
+                let reason = explain(reason);
                 match holder {
-                    Some(holder) => format!("{who} was refused: {reason}; {holder} is in control"),
+                    Some(holder) if reason.is_empty() => format!("{who} was refused: {holder} is in control"),
+                    Some(holder) => format!("{who} was refused: {holder} is in control, and {reason}"),
                     None => format!("{who} was refused: {reason}"),
                 }
             }
@@ -147,6 +148,27 @@ impl Event {
             Self::RoiEnded { who } => by("points at no place any more", who),
         }
     }
+}
+
+/// A reason in words; nothing where naming the holder says it all.
+fn explain(reason: &str) -> String {
+    match reason {
+        "not_in_control" => "",
+        "primary_is_active" => "steers at this moment",
+        "holder_must_release" => "must release first (takeover = \"ask\")",
+        "holder_ranks_no_lower" => "ranks no lower (takeover = \"priority\")",
+        "exclusively_held" => "must release first (takeover = \"exclusive\")",
+        "nobody_in_control" => "nobody is in control, and unclaimed = \"closed\" lets nobody steer before",
+        "other_vehicle" => "it belongs to another vehicle",
+        "half_a_pair" => "it named half of a system and component id",
+        "not_an_id" => "it named something that is no id",
+        "unknown_gimbal" => "it named a gimbal that is not here",
+        "no_gimbal_yet" => "no gimbal was heard yet",
+        "no_attitude" => "the attitude of the gimbal is not known",
+        "no_heading" => "the heading of the vehicle is not known",
+        _ => return reason.replace('_', " "),
+    }
+    .to_owned()
 }
 
 fn by(what: &str, who: Option<MavId>) -> String {
@@ -195,11 +217,11 @@ mod tests {
             (change(How::Lapsed, gcs, Some(gcs), None), "255/190 is silent and lost control"),
             (
                 Event::Refused { who: script, reason: "not_in_control", holder: Some(gcs) },
-                "245/191 was refused: not in control; 255/190 is in control",
+                "245/191 was refused: 255/190 is in control",
             ),
             (
                 Event::Refused { who: script, reason: "unknown_gimbal", holder: None },
-                "245/191 was refused: unknown gimbal",
+                "245/191 was refused: it named a gimbal that is not here",
             ),
         ] {
             assert_eq!(event.describe(), text);

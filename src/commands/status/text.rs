@@ -315,7 +315,7 @@ gimbal lamp  searching  auto  manager 192
   control   nobody
 
 events
-  250 ms ago     camera  1/100 was refused: not in control; 255/190 is in control (12 times)
+  250 ms ago     camera  1/100 was refused: 255/190 is in control (12 times)
   1 min 1 s ago  camera  255/190 took control from 1/1
 ";
         assert_eq!(report(&canned::snapshot()), expected);
