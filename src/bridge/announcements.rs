@@ -47,6 +47,7 @@ enum Kind {
     GivenBack,
     TakenOver,
     Refused,
+    AcquireWar,
 }
 
 /// One text to be sent.
@@ -83,6 +84,11 @@ impl Announcements {
             Event::Control(Change { place: Place::Primary, how: How::Restored, to: Some(to), .. }) => {
                 (Kind::GivenBack, to, format!("autopilot gave control back to {to}"))
             }
+            Event::AcquireWar { holder, .. } => {
+                (Kind::AcquireWar, holder, format!("acquire war, {holder} keeps control"))
+            }
+            // Of the war itself it was told.
+            Event::Refused { reason: "acquire_war", .. } => return None,
             // An exclusive holder is not bothered with what others want.
             Event::Refused { holder: Some(_), .. } if subject.takeover == Takeover::Exclusive => return None,
             Event::Refused { who, holder: Some(holder), reason: "holder_must_release" } => {
@@ -95,6 +101,7 @@ impl Announcements {
         };
         let (severity, kept) = match kind {
             Kind::Refused => (severity::NOTICE, NOT_FOR_REFUSALS),
+            Kind::AcquireWar => (severity::WARNING, 0),
             _ => (severity::NOTICE, 0),
         };
         self.may_say(now, (subject.manager, kind, Some(who)), kept)

@@ -140,7 +140,7 @@ impl Entry {
         let (what, text) = (event.name(), event.describe());
         match event {
             Event::Refused { .. } => tracing::debug!(gimbal, what, text, count, "event"),
-            Event::Lost { .. } => tracing::warn!(gimbal, what, text, "event"),
+            Event::Lost { .. } | Event::AcquireWar { .. } if told => tracing::warn!(gimbal, what, text, "event"),
             _ if told => tracing::info!(gimbal, what, text, "event"),
             _ => tracing::debug!(gimbal, what, text, "event"),
         }

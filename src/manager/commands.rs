@@ -6,6 +6,7 @@
 
 use std::time::Duration;
 
+use super::events::Event;
 use super::request::{Command, Configure, Refusal};
 use super::{GimbalManager, ManagerOutput, Sender, Surroundings, messages};
 use crate::timestamp::Timestamp;
@@ -175,8 +176,12 @@ impl GimbalManager {
         }
         let configure = Configure::read(command)?;
         let policy = self.policy(around);
+        let (before, was_truce) = (self.control.primary(), self.control.is_truce(now));
         let changes = self.control.configure(now, sender, configure, policy)?;
         self.after_changes_of_control(now, &changes);
+        if let Some(holder) = self.control.primary().filter(|_| self.control.is_truce(now) && !was_truce) {
+            self.tell(Event::AcquireWar { holder, other: before });
+        }
         Ok(())
     }
 }

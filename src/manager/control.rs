@@ -5,6 +5,7 @@
 //! back. Keeps no timers: when control lapses is decided in [`super::GimbalManager`], which tells how long each holder
 //! has been silent.
 
+mod damping;
 mod takeover;
 
 use std::time::Duration;
@@ -14,6 +15,7 @@ use super::request::{Claim, Configure, Refusal};
 use crate::gimbals::settings::Takeover;
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
+use damping::Damping;
 
 /// The two places, and since when their holders are silent.
 #[derive(Clone, Debug, Default)]
@@ -24,6 +26,7 @@ pub struct Control {
     lender: Option<Holder>,
     /// The autopilot that gave control back with −2 lately, and when (`px4_release_quirk`).
     quirk_release: Option<(MavId, Timestamp)>,
+    damping: Damping,
 }
 
 /// Who has one of the places.
@@ -92,8 +95,14 @@ const QUIRK_MEMORY: Duration = Duration::from_secs(5);
 pub const PRIMARY_SILENCE: Duration = Duration::from_secs(2);
 
 /// Reasons of refusals that lie in who holds primary control.
-pub const STANDS_IN_THE_WAY: [&str; 5] =
-    ["not_in_control", "primary_is_active", "holder_must_release", "holder_ranks_no_lower", "exclusively_held"];
+pub const STANDS_IN_THE_WAY: [&str; 6] = [
+    "not_in_control",
+    "primary_is_active",
+    "holder_must_release",
+    "holder_ranks_no_lower",
+    "exclusively_held",
+    "acquire_war",
+];
 
 impl Control {
     pub fn primary(&self) -> Option<MavId> {
@@ -115,6 +124,11 @@ impl Control {
     /// From whom the autopilot has borrowed primary control.
     pub fn lender(&self) -> Option<MavId> {
         self.lender.map(|holder| holder.id)
+    }
+
+    /// Whether primary control was taken over so often lately that it stays where it is for a while.
+    pub fn is_truce(&self, now: Timestamp) -> bool {
+        self.damping.is_truce(now)
     }
 
     /// Applies a CONFIGURE, both places or none; which of them changed hands.
@@ -229,6 +243,9 @@ impl Control {
             let rank = |id| policy.ranks.of(id, policy.autopilot);
             let attempt = takeover::Attempt { taker: rank(sender), holder: rank(holder), borrows, takes_back };
             takeover::check(policy.takeover, attempt)?;
+            if place == Place::Primary && to.is_some() {
+                self.damping.check(now)?;
+            }
         }
         let restored = lent.filter(|_| to.is_none());
         to = to.or(restored.map(|lender| lender.id));
@@ -250,6 +267,9 @@ impl Control {
         };
         if place == Place::Primary {
             self.lender = held.filter(|_| how == How::Borrowed);
+            if matches!(how, How::TakenOver | How::Borrowed) {
+                self.damping.note(now);
+            }
         }
         let heard = restored.map_or(now, |lender| lender.heard);
         *self.place_mut(place) = to.map(|id| Holder { id, since: now, heard });

@@ -14,6 +14,11 @@ pub enum Event {
         reason: &'static str,
         holder: Option<MavId>,
     },
+    /// Primary control was taken over too often; `holder` keeps it for a while, from `other` and everybody else.
+    AcquireWar {
+        holder: MavId,
+        other: Option<MavId>,
+    },
     /// The device was heard, for the first time under that id.
     Found {
         device: MavId,
@@ -68,6 +73,7 @@ impl Event {
                 How::SystemGone => "system_gone",
             },
             Self::Refused { .. } => "refused",
+            Self::AcquireWar { .. } => "acquire_war",
             Self::Found { .. } => "gimbal_found",
             Self::Back { .. } => "gimbal_back",
             Self::Lost { .. } => "gimbal_lost",
@@ -82,6 +88,7 @@ impl Event {
     pub const fn who(&self) -> Option<MavId> {
         match *self {
             Self::Control(Change { who, .. }) | Self::Refused { who, .. } | Self::RatesEnded { who, .. } => Some(who),
+            Self::AcquireWar { holder, .. } => Some(holder),
             Self::Found { device } | Self::Back { device } => Some(device),
             Self::Lost { device } | Self::Restarted { device } => device,
             Self::RoiStarted { who } | Self::RoiEnded { who } => who,
@@ -93,6 +100,7 @@ impl Event {
         match *self {
             Self::Control(Change { from, .. }) => from,
             Self::Refused { holder, .. } => holder,
+            Self::AcquireWar { other, .. } => other,
             _ => None,
         }
     }
@@ -101,6 +109,7 @@ impl Event {
     pub const fn to(&self) -> Option<MavId> {
         match *self {
             Self::Control(Change { to, .. }) => to,
+            Self::AcquireWar { holder, .. } => Some(holder),
             _ => None,
         }
     }
@@ -134,6 +143,10 @@ impl Event {
                     None => format!("{who} was refused: {reason}"),
                 }
             }
+            Self::AcquireWar { holder, other } => {
+                let others = other.map_or_else(|| "another".to_owned(), |other| other.to_string());
+                format!("{holder} and {others} keep taking control from each other; {holder} keeps it for a while")
+            }
             Self::Found { device } => format!("gimbal found as {device}"),
             Self::Back { device } => format!("gimbal {device} is back"),
             Self::Lost { .. } => "gimbal lost".to_owned(),
@@ -159,6 +172,7 @@ fn explain(reason: &str) -> String {
         "holder_ranks_no_lower" => "ranks no lower (takeover = \"priority\")",
         "exclusively_held" => "must release first (takeover = \"exclusive\")",
         "nobody_in_control" => "nobody is in control, and unclaimed = \"closed\" lets nobody steer before",
+        "acquire_war" => "control changed hands too often lately",
         "other_vehicle" => "it belongs to another vehicle",
         "half_a_pair" => "it named half of a system and component id",
         "not_an_id" => "it named something that is no id",

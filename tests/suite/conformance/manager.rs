@@ -5,6 +5,7 @@ mod bad_days;
 mod commands;
 mod control;
 mod control_takeover;
+mod control_war;
 mod events;
 mod frames;
 mod mount;
