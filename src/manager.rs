@@ -29,9 +29,9 @@ use crate::gimbals::setpoint::Setpoint;
 use crate::gimbals::settings::GimbalSettings;
 use crate::timestamp::Timestamp;
 use crate::vehicle::Vehicle;
-use crate::wire::MavId;
 use crate::wire::dialect::MavMessage;
 use crate::wire::ids::{CommandResult, FailureFlags, GimbalFlags};
+use crate::wire::{MavId, Target};
 use commands::LastCommand;
 use control::{Change, Control, PRIMARY_SILENCE, Place, Policy};
 use events::{Event, RatesEnd};
@@ -190,16 +190,17 @@ impl GimbalManager {
         // A place whose lease ran out is free from that moment on, not only when the timer came round to it.
         self.end_leases(now);
         match request {
-            Request::Demand { gimbal, demand } => {
-                if *gimbal != 0 && Some(*gimbal) != self.device_id() {
-                    return;
-                }
-                match self.handle_demand(now, sender.id, demand, around) {
-                    // A command that comes after it is none of the past.
-                    Ok(()) => self.last_command = None,
-                    Err(refusal) => self.count_refusal(sender.id, refusal.reason),
+            Request::Demand { target, gimbal, .. } if *gimbal != 0 && Some(*gimbal) != self.device_id() => {
+                // To everybody it was for the gimbal of another manager, perhaps.
+                if matches!(target, Target::Component(_)) {
+                    self.count_refusal(sender.id, "unknown_gimbal");
                 }
             }
+            Request::Demand { demand, .. } => match self.handle_demand(now, sender.id, demand, around) {
+                // A command that comes after it is none of the past.
+                Ok(()) => self.last_command = None,
+                Err(refusal) => self.count_refusal(sender.id, refusal.reason),
+            },
             Request::Command(command) => self.handle_command(now, sender, command, around),
         }
         self.carry_out(now, around);
@@ -401,7 +402,7 @@ impl GimbalManager {
         let of_device = GimbalFlags::ACCEPTS_YAW_IN_EARTH_FRAME | GimbalFlags::RC_EXCLUSIVE | GimbalFlags::RC_MIXED;
         let reported = self.status.map_or(GimbalFlags::empty(), |(_, status)| status.flags);
         match self.tracking.last() {
-            Some(setpoint) => setpoint.flags() | reported.intersection(of_device),
+            Some(setpoint) => setpoint.flags().difference(of_device) | reported.intersection(of_device),
             None => reported.intersection(GimbalFlags::from_bits_retain(0x3ff)),
         }
     }

@@ -158,14 +158,14 @@ fn angles(command: &Command, inputs: Inputs) -> Result<Demand, Refusal> {
         if degrees.is_some_and(|degrees| degrees.abs() > range) {
             return Err(Refusal::denied("looks_like_centidegrees"));
         }
-        let angle = degrees.map(|degrees| Angle::from_degrees(degrees).wrapped());
-        Ok(AxisDemand { angle, ..AxisDemand::default() })
+        Ok(AxisDemand { angle: degrees.map(Angle::from_degrees), ..AxisDemand::default() })
     };
+    let yaw = axis(3, inputs.yaw, YAW_RANGE)?;
     Ok(Demand {
         flags: held(inputs.yaw),
         pitch: axis(1, inputs.pitch, PITCH_RANGE)?,
         roll: axis(2, inputs.roll, ROLL_RANGE)?,
-        yaw: axis(3, inputs.yaw, YAW_RANGE)?,
+        yaw: AxisDemand { angle: yaw.angle.map(Angle::wrapped), ..yaw },
         kind: DemandKind::Commanded,
     })
 }

@@ -13,6 +13,7 @@ use crate::wire::{Frame, MavId, Target};
 pub enum Request {
     /// A demand on the gimbal by message: no answer is due.
     Demand {
+        target: Target,
         gimbal: u8,
         demand: Demand,
     },
@@ -90,9 +91,11 @@ pub fn read_request(frame: &Frame<'_>) -> Option<Result<Request, Refusal>> {
     let request = match frame.message_id() {
         message::COMMAND_LONG => frame.decode().map(|message| Ok(Request::Command(command_long(frame, &message)))),
         message::COMMAND_INT => frame.decode().map(|message| Ok(Request::Command(command_int(frame, &message)))),
-        message::GIMBAL_MANAGER_SET_ATTITUDE => frame.decode().map(|message| set_attitude(&message)),
-        message::GIMBAL_MANAGER_SET_PITCHYAW => frame.decode().map(|message| set_pitchyaw(&message)),
-        message::GIMBAL_MANAGER_SET_MANUAL_CONTROL => frame.decode().map(|message| set_manual_control(&message)),
+        message::GIMBAL_MANAGER_SET_ATTITUDE => frame.decode().map(|message| set_attitude(frame.target(), &message)),
+        message::GIMBAL_MANAGER_SET_PITCHYAW => frame.decode().map(|message| set_pitchyaw(frame.target(), &message)),
+        message::GIMBAL_MANAGER_SET_MANUAL_CONTROL => {
+            frame.decode().map(|message| set_manual_control(frame.target(), &message))
+        }
         _ => None,
     };
     request.map(|request| {
@@ -135,13 +138,14 @@ fn command_int(frame: &Frame<'_>, message: &COMMAND_INT_DATA) -> Command {
 const NAN_AS_INTEGER: i32 = 0x7ff8_0000;
 
 /// `GIMBAL_MANAGER_SET_ATTITUDE` (282): a quaternion of four NaN states no angle.
-fn set_attitude(message: &GIMBAL_MANAGER_SET_ATTITUDE_DATA) -> Result<Request, Refusal> {
+fn set_attitude(target: Target, message: &GIMBAL_MANAGER_SET_ATTITUDE_DATA) -> Result<Request, Refusal> {
     // The frame of the quaternion follows from the flags; the angles are the same numbers in either.
     let attitude: Option<Attitude<EarthFrame>> =
         Attitude::from_wxyz(message.q).map_err(|_| Refusal::denied("malformed_quaternion"))?;
     let angles = attitude.map(Attitude::gimbal_angles);
     let angle = |of: fn(GimbalAngles) -> Angle| angles.map(of);
     Ok(Request::Demand {
+        target,
         gimbal: message.gimbal_device_id,
         demand: Demand {
             flags: GimbalFlags::from_bits_retain(message.flags as u16),
@@ -154,21 +158,25 @@ fn set_attitude(message: &GIMBAL_MANAGER_SET_ATTITUDE_DATA) -> Result<Request, R
 }
 
 /// `GIMBAL_MANAGER_SET_PITCHYAW` (287), in radians.
-fn set_pitchyaw(message: &GIMBAL_MANAGER_SET_PITCHYAW_DATA) -> Result<Request, Refusal> {
+fn set_pitchyaw(target: Target, message: &GIMBAL_MANAGER_SET_PITCHYAW_DATA) -> Result<Request, Refusal> {
     Ok(Request::Demand {
+        target,
         gimbal: message.gimbal_device_id,
         demand: Demand {
             flags: GimbalFlags::from_bits_retain(message.flags as u16),
             roll: AxisDemand::default(),
             pitch: AxisDemand { angle: angle(message.pitch, PITCH_RANGE)?, rate: rate(message.pitch_rate)? },
-            yaw: AxisDemand { angle: angle(message.yaw, YAW_RANGE)?, rate: rate(message.yaw_rate)? },
+            yaw: AxisDemand {
+                angle: angle(message.yaw, YAW_RANGE)?.map(Angle::wrapped),
+                rate: rate(message.yaw_rate)?,
+            },
             kind: DemandKind::Streamed,
         },
     })
 }
 
 /// `GIMBAL_MANAGER_SET_MANUAL_CONTROL` (288), −1 to 1; beyond that is taken for the end.
-fn set_manual_control(message: &GIMBAL_MANAGER_SET_MANUAL_CONTROL_DATA) -> Result<Request, Refusal> {
+fn set_manual_control(target: Target, message: &GIMBAL_MANAGER_SET_MANUAL_CONTROL_DATA) -> Result<Request, Refusal> {
     let axis = |stick: f32, rate_stick: f32| -> Result<AxisDemand, Refusal> {
         let fraction = |stick: f32| Ok(number(stick)?.map(|stick| stick.clamp(-1.0, 1.0)));
         let rate = fraction(rate_stick)?.map(AngularRate::from_radians_per_second);
@@ -177,6 +185,7 @@ fn set_manual_control(message: &GIMBAL_MANAGER_SET_MANUAL_CONTROL_DATA) -> Resul
         Ok(AxisDemand { angle, rate })
     };
     Ok(Request::Demand {
+        target,
         gimbal: message.gimbal_device_id,
         demand: Demand {
             flags: GimbalFlags::from_bits_retain(message.flags as u16),
@@ -201,7 +210,7 @@ const LARGEST_RATE: f64 = 100.0;
 fn angle(radians: f32, range: f64) -> Result<Option<Angle>, Refusal> {
     let degrees = number(radians)?.map(f64::to_degrees);
     let angle = within(degrees, range + ROUNDING, "angle_out_of_range")?;
-    Ok(angle.map(|degrees| Angle::from_degrees(degrees).wrapped()))
+    Ok(angle.map(Angle::from_degrees))
 }
 
 fn rate(radians_per_second: f32) -> Result<Option<AngularRate>, Refusal> {
@@ -290,15 +299,12 @@ impl Command {
         let pitch = within(pitch, PITCH_RANGE, "angle_out_of_range")?;
         let yaw = within(yaw, YAW_RANGE, "angle_out_of_range")?;
         let (pitch_rate, yaw_rate) = (self.degrees_per_second(3)?, self.degrees_per_second(4)?);
-        let axis = |angle: Option<f64>, rate: Option<AngularRate>| {
-            let angle = angle.map(|angle| Angle::from_degrees(angle).wrapped());
-            AxisDemand { angle, rate }
-        };
         let demand = Demand {
             flags: self.flags()?,
             roll: AxisDemand::default(),
-            pitch: axis(pitch, pitch_rate),
-            yaw: axis(yaw, yaw_rate),
+            // Straight back over the head is not straight back under the feet, so only yaw goes round.
+            pitch: AxisDemand { angle: pitch.map(Angle::from_degrees), rate: pitch_rate },
+            yaw: AxisDemand { angle: yaw.map(|yaw| Angle::from_degrees(yaw).wrapped()), rate: yaw_rate },
             kind: DemandKind::Commanded,
         };
         check(&demand)?;

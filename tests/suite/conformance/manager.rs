@@ -1,5 +1,6 @@
 //! The gimbal manager as its clients see it (protocol checklist 8.4 to 8.7, 8.9, 8.14).
 
+mod angles;
 mod answers;
 mod bad_days;
 mod commands;
@@ -10,6 +11,7 @@ mod events;
 mod frames;
 mod mount;
 mod presence;
+mod radio_control;
 mod rates;
 mod repeats;
 mod roi;

@@ -15,8 +15,8 @@ use gimbald::wire::target::message_shape;
 use proptest::prelude::*;
 
 use crate::support::script::{
-    NAN, command_int, command_long, device_information, device_status, gimbal_heartbeat, of, px4_heartbeat,
-    set_attitude, set_manual_control, set_pitchyaw, usual_capabilities,
+    NAN, command_int, command_long, device_information, device_status, gimbal_heartbeat, global_position, in_frame, of,
+    px4_heartbeat, set_attitude, set_manual_control, set_pitchyaw, usual_capabilities,
 };
 use crate::support::wire::checksum;
 use crate::support::world::{AUTOPILOT, Arrival, GCS, GIMBAL, MANAGER, Places, World, three_links};
@@ -47,6 +47,11 @@ enum Step {
     Turn {
         heading_deg: f64,
     },
+    /// The vehicle is somewhere.
+    Fly {
+        latitude_deg: f64,
+        altitude_m: f64,
+    },
     Wait {
         millis: u64,
     },
@@ -75,7 +80,7 @@ proptest! {
             flags = match &step {
                 Step::Look { flags, .. } => *flags,
                 Step::Wait { .. } => 44,
-                Step::Say { .. } | Step::Babble { .. } | Step::Turn { .. } => flags,
+                Step::Say { .. } | Step::Babble { .. } | Step::Turn { .. } | Step::Fly { .. } => flags,
             };
             let acked = take_step(&mut world, places, step);
             prop_assert!(acked <= 1, "one command, {acked} answers");
@@ -168,6 +173,11 @@ fn take_step(world: &mut World, places: Places, step: Step) -> usize {
         Step::Turn { heading_deg } => {
             let state = crate::support::script::autopilot_state(world.now, MavId::new(0, 0), heading_deg);
             world.send(places.autopilot, AUTOPILOT, &MavMessage::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE(state));
+            0
+        }
+        Step::Fly { latitude_deg, altitude_m } => {
+            let position = global_position(world.now, [latitude_deg, 8.5, altitude_m], 50.0);
+            world.send(places.autopilot, AUTOPILOT, &position);
             0
         }
         Step::Wait { millis } => {
@@ -313,6 +323,8 @@ fn step() -> BoxedStrategy<Step> {
         2 => (-90.0..90.0, -180.0..180.0, 0_u16..2048, prop_oneof![4 => Just(0_u32), 1 => 0_u32..1024])
             .prop_map(|(pitch_deg, yaw_deg, flags, failure_flags)| Step::Look { pitch_deg, yaw_deg, flags, failure_flags }),
         2 => (0.0..360.0).prop_map(|heading_deg| Step::Turn { heading_deg }),
+        2 => (47.4..47.401, 100.0..103.0)
+            .prop_map(|(latitude_deg, altitude_m)| Step::Fly { latitude_deg, altitude_m }),
         4 => prop_oneof![3 => 0_u64..500, 1 => 0_u64..12_000].prop_map(|millis| Step::Wait { millis }),
     ].boxed()
 }
@@ -332,6 +344,16 @@ fn message() -> BoxedStrategy<MavMessage> {
         1 => (target(), prop_oneof![Just(195_u16), Just(197), Just(512), Just(511), Just(510), Just(201), Just(2000)],
               number(), number(), number(), number())
             .prop_map(|(target, command, a, b, c, d)| command_long(target, command, &[a, b, NAN, NAN, c, d, 500.0])),
+        2 => (target(), prop_oneof![Just(195_u16), Just(197)], device_id(), prop_oneof![4 => Just(0_u8), 1 => 0_u8..12],
+              474_000_000..474_010_000, 100.0_f32..103.0)
+            .prop_map(|(target, command, id, frame, x, z)| {
+                in_frame(frame, command_int(target, command, [id, NAN, NAN, NAN], x, 85_000_000, z))
+            }),
+        2 => (target(), prop_oneof![Just(204_u16), Just(205)], number(), angle(), angle(), mount_mode(), number(), mount_mode())
+            .prop_map(|(target, command, a, b, c, first, d, last)| {
+                let params = if command == 204 { [first, a, b, c, d, d, last] } else { [a, b, c, 100.0, 47.4, 8.5, last] };
+                command_long(target, command, &params)
+            }),
         3 => (angle(), angle(), number(), number(), flags())
             .prop_map(|(pitch, yaw, pitch_rate, yaw_rate, flags)| set_pitchyaw(pitch, yaw, pitch_rate, yaw_rate, flags)),
         2 => (numbers(), number(), number(), number(), flags())
@@ -339,6 +361,10 @@ fn message() -> BoxedStrategy<MavMessage> {
         2 => (number(), number(), flags()).prop_map(|(y, z, flags)| set_attitude([NAN; 4], [NAN, y, z], flags)),
         2 => numbers().prop_map(|[a, b, c, d]| set_manual_control(a, b, c, d)),
     ].boxed()
+}
+
+fn mount_mode() -> BoxedStrategy<f32> {
+    prop_oneof![8 => (0_u8..8).prop_map(f32::from), 1 => number()].boxed()
 }
 
 fn target() -> BoxedStrategy<MavId> {
