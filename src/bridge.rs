@@ -35,7 +35,7 @@ use crate::timers::TimerTable;
 use crate::timestamp::Timestamp;
 use crate::vehicle::Vehicle;
 use crate::wire::dialect::MavMessage;
-use crate::wire::ids::{component, mav_state};
+use crate::wire::ids::{component, mav_state, mav_type};
 use crate::wire::{DatagramFrames, FrameBuffer, MavId, StreamDecoder};
 use announcements::Announcements;
 use channels::Channels;
@@ -408,7 +408,7 @@ impl Bridge {
         let speaks_first =
             |channel: &ChannelId| self.channels.link_of(*channel).is_some_and(|(_, link)| link.settings.speaks_first);
         let channels: Vec<ChannelId> = self.channels.with_role(Role::Autopilot).filter(speaks_first).collect();
-        let message = messages::heartbeat(mav_state::BOOT);
+        let message = messages::heartbeat(mav_type::ONBOARD_CONTROLLER, mav_state::BOOT);
         for channel in channels {
             self.send_as(now, FALLBACK_SYSTEM_ID, channel.into(), component::ONBOARD_COMPUTER, &message);
         }
@@ -427,8 +427,8 @@ impl Bridge {
             for at in 0..self.roster.len() {
                 let gimbal = self.roster.get_mut(at);
                 if gimbal.beats() {
-                    let component = gimbal.component;
-                    self.send(now, self.channels.open_set(), component, &heartbeat::goodbye());
+                    let (component, goodbye) = (gimbal.component, heartbeat::goodbye(gimbal));
+                    self.send(now, self.channels.open_set(), component, &goodbye);
                 }
             }
         }

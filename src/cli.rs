@@ -200,6 +200,14 @@ pub struct SimGimbalArgs {
     /// How far the gimbal yaws to either side, degrees; without it, it turns without end
     #[arg(long, value_name = "DEG", value_parser = yaw_range)]
     pub yaw_range: Option<f64>,
+
+    /// How a gimbal of family mavlink_v1 says where it looks
+    #[arg(long, value_name = "MESSAGE", value_enum, default_value_t = SimulatedReports::Orientation)]
+    pub v1_reports: SimulatedReports,
+
+    /// A gimbal of family mavlink_v1 counts pitch and yaw the other way round, as ArduPilot does towards a STorM32
+    #[arg(long)]
+    pub v1_reversed: bool,
 }
 
 #[derive(Debug, Args)]
@@ -248,6 +256,18 @@ pub enum SimulatedFamily {
     /// A gimbal device of the MAVLink Gimbal Protocol v2
     #[value(name = "mavlink_v2")]
     MavlinkV2,
+    /// A gimbal that is told where to look by DO_MOUNT_CONTROL
+    #[value(name = "mavlink_v1")]
+    MavlinkV1,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SimulatedReports {
+    /// MOUNT_ORIENTATION, ten times a second
+    Orientation,
+    /// MOUNT_STATUS, four times a second
+    Status,
+    Nothing,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -3,6 +3,7 @@
 pub mod adapt;
 pub mod capabilities;
 pub mod driver;
+pub mod mavlink_v1;
 pub mod mavlink_v2;
 pub mod report;
 pub mod setpoint;

@@ -12,6 +12,7 @@ pub mod rank;
 pub mod request;
 pub mod settings;
 pub mod tracking;
+pub mod voice;
 
 mod commands;
 mod inquiries;
@@ -42,6 +43,7 @@ use rank::Ranks;
 use request::{Demand, DemandKind, Refusal, Request};
 use settings::ControlSettings;
 use tracking::{RateTimeouts, Situation, Tracking};
+use voice::DeviceVoice;
 
 /// An attitude older than this is not where the gimbal looks now.
 const ATTITUDE_STALE: Duration = Duration::from_secs(1);
@@ -129,6 +131,8 @@ pub struct GimbalManager {
     tracking: Tracking,
     status_schedule: Schedule,
     information_schedule: Schedule,
+    /// What it says for a gimbal that is no v2 device.
+    voice: Option<DeviceVoice>,
     /// When whose demand is being carried out was last heard.
     source_heard: Timestamp,
     /// What the gimbal's idea of the vehicle's heading has more than the autopilot's; carries over the time when the
@@ -149,7 +153,8 @@ pub struct GimbalManager {
 }
 
 impl GimbalManager {
-    pub fn new(settings: GimbalSettings, rules: ControlSettings) -> Self {
+    /// `voice`: where the gimbal is no v2 device.
+    pub fn new(settings: GimbalSettings, rules: ControlSettings, voice: Option<DeviceVoice>) -> Self {
         Self {
             tracking: Tracking::new(settings.setpoint_rate_hz),
             settings,
@@ -162,6 +167,7 @@ impl GimbalManager {
             control: Control::default(),
             status_schedule: Schedule::new(Interval::Every(DEFAULT_STATUS_INTERVAL)),
             information_schedule: Schedule::new(Interval::Off),
+            voice,
             source_heard: Timestamp::ZERO,
             heading_bias: Angle::ZERO,
             primary_demand: None,
@@ -178,11 +184,17 @@ impl GimbalManager {
     pub fn open_channel(&mut self, now: Timestamp, channel: ChannelId) {
         self.status_schedule.open(now, channel);
         self.information_schedule.open(now, channel);
+        if let Some(voice) = &mut self.voice {
+            voice.schedule.open(now, channel);
+        }
     }
 
     pub fn close_channel(&mut self, channel: ChannelId) {
         self.status_schedule.close(channel);
         self.information_schedule.close(channel);
+        if let Some(voice) = &mut self.voice {
+            voice.schedule.close(channel);
+        }
     }
 
     /// A request addressed to this manager, or to everybody.
@@ -253,6 +265,9 @@ impl GimbalManager {
                 if let (Some(of_gimbal), Some(of_vehicle)) = (status.heading, around.vehicle.heading(now)) {
                     self.heading_bias = (of_gimbal - of_vehicle).wrapped();
                 }
+                if let Some(voice) = &mut self.voice {
+                    voice.handle_status(status);
+                }
                 self.status = Some((now, status));
             }
             Report::Lost => {
@@ -310,12 +325,19 @@ impl GimbalManager {
         {
             self.outputs.push_back(ManagerOutput::Broadcast { channels: Some(due), message });
         }
+        let due = self.voice.as_mut().map_or(ChannelSet::EMPTY, |voice| voice.schedule.take_due(now));
+        if !due.is_empty()
+            && let Some(message) = self.device_attitude_status(now, around)
+        {
+            self.outputs.push_back(ManagerOutput::Broadcast { channels: Some(due), message });
+        }
         self.tracking.handle_timeout(now);
         self.carry_out(now, around);
     }
 
     pub fn poll_timeout(&self) -> Option<Timestamp> {
-        let schedules = [self.status_schedule.poll_timeout(), self.information_schedule.poll_timeout()];
+        let voice = self.voice.as_ref().and_then(|voice| voice.schedule.poll_timeout());
+        let schedules = [self.status_schedule.poll_timeout(), self.information_schedule.poll_timeout(), voice];
         // Without a device there is nothing to tell of.
         let schedules = schedules.into_iter().flatten().filter(|_| self.device.is_some());
         let lease = self.rules.lease_timeout;
@@ -351,9 +373,14 @@ impl GimbalManager {
         self.device
     }
 
-    /// The gimbal device id of 280 and 281: a v2 device's component id.
+    /// The gimbal device id of 280 and 281: a v2 device's component id, any other gimbal's number.
     pub fn device_id(&self) -> Option<u8> {
-        self.device.map(|device| device.component)
+        self.device.map(|device| self.number().unwrap_or(device.component))
+    }
+
+    /// 1 to 6 where the gimbal is no v2 device.
+    pub fn number(&self) -> Option<u8> {
+        self.voice.as_ref().map(DeviceVoice::number)
     }
 
     pub fn state(&self) -> DeviceState {
@@ -559,10 +586,11 @@ impl GimbalManager {
         self.tracking.is_rotating().then(|| self.source_heard + self.rules.lease_timeout)
     }
 
-    /// 280 to everybody, once the gimbal is known.
+    /// 280 to everybody, once the gimbal is known. What we say for the gimbal comes before it: MAVSDK 3 knows a name only
+    /// if it has 283 before 280.
     fn announce(&mut self, now: Timestamp, around: Surroundings<'_>) {
         self.told_can_aim = can_aim(now, around);
-        if let Some(message) = self.information(now, around) {
+        for message in [self.device_information(now), self.information(now, around)].into_iter().flatten() {
             self.outputs.push_back(ManagerOutput::Broadcast { channels: None, message });
         }
     }
@@ -571,6 +599,19 @@ impl GimbalManager {
     fn information(&self, now: Timestamp, around: Surroundings<'_>) -> Option<Box<MavMessage>> {
         let (device_id, capabilities) = (self.device_id()?, self.capabilities.as_ref()?);
         Some(Box::new(messages::information(now, device_id, capabilities, can_aim(now, around))))
+    }
+
+    /// 283 in the name of a gimbal that is no v2 device, once it is known.
+    fn device_information(&self, now: Timestamp) -> Option<Box<MavMessage>> {
+        let (voice, capabilities) = (self.voice.as_ref()?, self.capabilities.as_ref()?);
+        self.device.map(|_| Box::new(voice.information(now, &self.identity, capabilities)))
+    }
+
+    /// 285 in the name of a gimbal that is no v2 device, once it has told where it looks.
+    fn device_attitude_status(&self, now: Timestamp, around: Surroundings<'_>) -> Option<Box<MavMessage>> {
+        let (is_alive, is_locked) = (self.state == DeviceState::Alive, self.tracking.is_locked());
+        let heading = around.vehicle.heading(now);
+        self.voice.as_ref()?.attitude_status(now, is_alive, is_locked, heading).map(Box::new)
     }
 
     /// 281, once there is a gimbal.

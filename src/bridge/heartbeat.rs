@@ -18,10 +18,10 @@ pub fn heartbeat(gimbal: &Gimbal, bootstrap: bool) -> MavMessage {
         DeviceState::Alive => mav_state::ACTIVE,
         DeviceState::Lost => mav_state::CRITICAL,
     };
-    messages::heartbeat(state)
+    messages::heartbeat(gimbal.mav_type(), state)
 }
 
 /// The last one of a manager that is going away.
-pub fn goodbye() -> MavMessage {
-    messages::heartbeat(mav_state::POWEROFF)
+pub fn goodbye(gimbal: &Gimbal) -> MavMessage {
+    messages::heartbeat(gimbal.mav_type(), mav_state::POWEROFF)
 }

@@ -114,7 +114,7 @@ impl Bridge {
         GimbalSnapshot {
             name: manager.settings().name.clone(),
             configured: gimbal.configured,
-            family: "mavlink_v2".to_owned(),
+            family: gimbal.family().name().to_owned(),
             manager_component_id: gimbal.component,
             device_id: manager.device_id(),
             device: manager.device().map(|device| device.to_string()),

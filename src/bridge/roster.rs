@@ -12,14 +12,16 @@ pub use adoption::{Hearing, NotAdopted, Place, Renamed};
 use super::LinkIndex;
 use super::settings::Settings;
 use crate::channel::{ChannelId, ChannelSet};
+use crate::gimbals::mavlink_v1::MavlinkV1Driver;
 use crate::gimbals::mavlink_v2::MavlinkV2Driver;
-use crate::gimbals::settings::GimbalSettings;
+use crate::gimbals::settings::{Family, GimbalSettings};
 use crate::gimbals::{DriverOutput, GimbalDriver};
 use crate::manager::settings::ControlSettings;
+use crate::manager::voice::{self, DeviceVoice};
 use crate::manager::{GimbalManager, ManagerOutput};
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
-use crate::wire::ids::component;
+use crate::wire::ids::{component, mav_type};
 
 /// A gimbal with its manager and driver.
 #[derive(Debug)]
@@ -46,10 +48,21 @@ pub struct Gimbal {
 }
 
 impl Gimbal {
-    fn new(settings: GimbalSettings, rules: &ControlSettings, component: u8, configured: bool) -> Self {
+    /// `number`: its device id where it is no v2 device.
+    fn new(
+        settings: GimbalSettings,
+        rules: &ControlSettings,
+        component: u8,
+        configured: bool,
+        number: Option<u8>,
+    ) -> Self {
+        let driver: Box<dyn GimbalDriver> = match settings.family {
+            Family::Auto | Family::MavlinkV2 => Box::new(MavlinkV2Driver::new()),
+            Family::MavlinkV1 => Box::new(MavlinkV1Driver::new(settings.v1_sign)),
+        };
         Self {
-            manager: GimbalManager::new(settings, rules.clone()),
-            driver: Box::new(MavlinkV2Driver::new()),
+            manager: GimbalManager::new(settings, rules.clone(), number.map(DeviceVoice::new)),
+            driver,
             adopted: None,
             channel: None,
             link: 0,
@@ -65,9 +78,26 @@ impl Gimbal {
     /// What it was told and what it said is forgotten, and it is looked for as in the beginning.
     fn start_over(&mut self, rules: &ControlSettings, open: ChannelSet, now: Timestamp) {
         let settings = self.manager.settings().clone();
-        *self = Self::new(settings, rules, self.component, self.configured);
+        *self = Self::new(settings, rules, self.component, self.configured, self.manager.number());
         for channel in open {
             self.manager.open_channel(now, channel);
+        }
+    }
+
+    /// What it speaks, as far as that is known.
+    pub fn family(&self) -> Family {
+        match self.manager.settings().family {
+            Family::Auto => Family::MavlinkV2,
+            family => family,
+        }
+    }
+
+    /// `MAV_TYPE` of its manager: "the MAV_TYPE is correctly set to MAV_TYPE_GIMBAL" on the ids of gimbals, where it
+    /// speaks for one.
+    pub fn mav_type(&self) -> u8 {
+        match self.component {
+            component::GIMBAL | component::GIMBAL2..=component::GIMBAL6 => mav_type::GIMBAL,
+            _ => mav_type::ONBOARD_CONTROLLER,
         }
     }
 
@@ -128,9 +158,14 @@ impl Roster {
                     .find(|free| !wanted.contains(&Some(*free)));
             }
         }
+        // "1 to 6, its place among the non-v2 gimbals."
+        let mut numbers = 1..=voice::LAST_NUMBER;
         for (gimbal, component) in settings.gimbals.iter().zip(wanted) {
             let component = component.expect("the configuration was refused when a manager component is missing");
-            roster.gimbals.push(Gimbal::new(gimbal.clone(), &settings.control, component, true));
+            let number = gimbal.family.speaks_through_manager().then(|| {
+                numbers.next().expect("the configuration was refused when there are more than six such gimbals")
+            });
+            roster.gimbals.push(Gimbal::new(gimbal.clone(), &settings.control, component, true, number));
         }
         roster.ensure_first_manager();
         roster
@@ -209,7 +244,7 @@ impl Roster {
             }
         };
         let settings = GimbalSettings::found(self.free_name(device, ours));
-        let mut gimbal = Gimbal::new(settings, &self.rules, component, false);
+        let mut gimbal = Gimbal::new(settings, &self.rules, component, false, None);
         for channel in self.open {
             gimbal.manager.open_channel(now, channel);
         }
@@ -238,7 +273,7 @@ impl Roster {
         let chosen = self.gimbals.iter().any(|gimbal| gimbal.manager.settings().manager_component_id.is_some());
         if !self.has_manager(first) && !chosen {
             let settings = GimbalSettings::found(format!("gimbal-{}", component::GIMBAL));
-            self.gimbals.push(Gimbal::new(settings, &self.rules, first, false));
+            self.gimbals.push(Gimbal::new(settings, &self.rules, first, false, None));
         }
     }
 }

@@ -18,7 +18,9 @@ use crate::daemon::clock::unix_time_us;
 use crate::daemon::supervisor;
 use crate::endpoint::Endpoint;
 use crate::exit_code::ExitCode;
+use crate::gimbals::mavlink_v1;
 use crate::gimbals::mavlink_v2::sim::{Device, DeviceSettings};
+use crate::gimbals::settings::{Family, GimbalSettings};
 use crate::links::{self, Link};
 use crate::sim::host::{self, HostError};
 use crate::sim::peer::Peer;
@@ -83,6 +85,10 @@ fn run(arguments: &DemoArgs, output: &mut impl Write) -> Result<(), DemoError> {
             let device = Device::new(Timestamp::ZERO, DeviceSettings::default());
             Simulation::start("gimbal", device, move || Ok(Box::new(cable.into_link()?)))?
         }
+        SimulatedFamily::MavlinkV1 => {
+            let device = mavlink_v1::sim::Device::new(Timestamp::ZERO, mavlink_v1::sim::DeviceSettings::default());
+            Simulation::start("gimbal", device, move || Ok(Box::new(cable.into_link()?)))?
+        }
     };
     if let Some(seconds) = arguments.duration {
         end_after(Duration::from_secs(u64::from(seconds))).map_err(DemoError::Thread)?;
@@ -104,8 +110,14 @@ fn daemon_settings(arguments: &DemoArgs, gimbal: Endpoint, autopilot: SocketAddr
         ("client", Role::Ground, Endpoint::UdpIn(CLIENT)),
     ];
     let links = all.iter().map(|(name, role, endpoint)| link_on((*name).to_owned(), *role, endpoint)).collect();
+    let gimbals = match arguments.family {
+        SimulatedFamily::MavlinkV2 => Vec::new(),
+        SimulatedFamily::MavlinkV1 => {
+            vec![GimbalSettings { family: Family::MavlinkV1, ..GimbalSettings::found("camera".to_owned()) }]
+        }
+    };
     DaemonSettings {
-        core: Settings { links, ..Settings::default() },
+        core: Settings { links, gimbals, ..Settings::default() },
         endpoints: all.into_iter().map(|(_, _, endpoint)| endpoint).collect(),
         http: Some(HttpSettings { listen: arguments.http, token_file: None }),
         // A simulated vehicle's id is not worth keeping.

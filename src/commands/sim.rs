@@ -4,13 +4,15 @@ use std::io::Write;
 use std::time::Duration;
 
 use crate::cli::{
-    SimCommand, SimGimbalArgs, SimVehicleArgs, SimulatedAutopilot, SimulatedFamily, SimulatedFrames,
+    SimCommand, SimGimbalArgs, SimVehicleArgs, SimulatedAutopilot, SimulatedFamily, SimulatedFrames, SimulatedReports,
     SimulatedStatusFrame,
 };
 use crate::daemon::clock::unix_time_us;
 use crate::endpoint::Endpoint;
 use crate::exit_code::ExitCode;
 use crate::geometry::{Angle, AngularRate, AxisLimits, Limits};
+use crate::gimbals::mavlink_v1;
+use crate::gimbals::mavlink_v1::packet::Signs;
 use crate::gimbals::mavlink_v2::sim::{Device, DeviceSettings, StatusFrame, Strictness, SystemId};
 use crate::links;
 use crate::sim::faults::{Faults, FaultyPeer};
@@ -43,6 +45,32 @@ pub fn run_sim_gimbal(arguments: &SimGimbalArgs, errors: &mut impl Write) -> Exi
             let device = Device::new(Timestamp::ZERO, device_settings(arguments));
             run(FaultyPeer::new(device, faults), &arguments.endpoint, errors)
         }
+        SimulatedFamily::MavlinkV1 => {
+            let device = mavlink_v1::sim::Device::new(Timestamp::ZERO, v1_settings(arguments));
+            run(FaultyPeer::new(device, faults), &arguments.endpoint, errors)
+        }
+    }
+}
+
+fn v1_settings(arguments: &SimGimbalArgs) -> mavlink_v1::sim::DeviceSettings {
+    use mavlink_v1::sim::{Feedback, SystemId};
+
+    let defaults = mavlink_v1::sim::DeviceSettings::default();
+    let yaw = arguments.yaw_range.map(Angle::from_degrees).and_then(|range| AxisLimits::new(-range, range));
+    mavlink_v1::sim::DeviceSettings {
+        component_id: arguments.component_id,
+        system_id: SystemId::Fixed(arguments.system_id),
+        signs: if arguments.v1_reversed { Signs::Reversed } else { Signs::Normal },
+        feedback: match arguments.v1_reports {
+            SimulatedReports::Orientation => Feedback::Orientation,
+            SimulatedReports::Status => Feedback::Status,
+            SimulatedReports::Nothing => Feedback::Nothing,
+        },
+        plant: PlantSettings {
+            limits: Limits { yaw: yaw.or(defaults.plant.limits.yaw), ..defaults.plant.limits },
+            ..defaults.plant.clone().with_max_rate(AngularRate::from_degrees_per_second(arguments.slew))
+        },
+        ..defaults
     }
 }
 

@@ -9,11 +9,13 @@ use super::schema::Gimbal;
 /// The managers that need no setting: ONBOARD_COMPUTER to ONBOARD_COMPUTER4.
 const AUTOMATIC: [u8; 4] = [191, 192, 193, 194];
 
-/// Why a manager may not have a component id, as "component … is …".
-fn reserved(id: u8) -> Option<&'static str> {
+/// Why the manager of a gimbal may not have a component id, as "component … is …".
+fn reserved(id: u8, gimbal: &Gimbal) -> Option<&'static str> {
+    // The manager of a gimbal that is no v2 device speaks for the device, too.
+    let speaks_for_device = gimbal.family.as_ref().is_some_and(|family| family.value.speaks_through_manager());
     match id {
         100..=105 => Some("a camera's"),
-        154 | 171..=175 => Some("a gimbal device's"),
+        154 | 171..=175 if !speaks_for_device => Some("a gimbal device's"),
         _ => None,
     }
 }
@@ -28,7 +30,7 @@ fn check_managers(gimbals: &[Gimbal], problems: &mut Vec<Problem>) {
     let mut taken = Vec::new();
     for gimbal in gimbals {
         let Some(id) = &gimbal.manager_component_id else { continue };
-        if let Some(owner) = reserved(id.value) {
+        if let Some(owner) = reserved(id.value, gimbal) {
             problems.push(id.problem(format!("found {}, which is {owner} id", id.value), EXPECTED));
         } else if taken.contains(&id.value) {
             problems.push(id.problem(format!("found {}, which another gimbal's manager has", id.value), EXPECTED));

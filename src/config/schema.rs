@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use crate::bridge::settings::{Role, SystemId};
 use crate::endpoint::{Endpoint, EndpointError};
+use crate::gimbals::mavlink_v1::packet::Signs;
 use crate::gimbals::settings::{DeviceYawFrame, Family, Takeover};
 use crate::manager::settings::{AltitudeReference, Firewall};
 
@@ -22,8 +23,11 @@ const ROLES: &[(&str, Role)] = &[
     (Role::Ground.name(), Role::Ground),
     (Role::Peer.name(), Role::Peer),
 ];
-const FAMILIES: &[(&str, Family)] =
-    &[(Family::Auto.name(), Family::Auto), (Family::MavlinkV2.name(), Family::MavlinkV2)];
+const FAMILIES: &[(&str, Family)] = &[
+    (Family::Auto.name(), Family::Auto),
+    (Family::MavlinkV2.name(), Family::MavlinkV2),
+    (Family::MavlinkV1.name(), Family::MavlinkV1),
+];
 const TAKEOVERS: &[(&str, Takeover)] = &[
     (Takeover::Open.name(), Takeover::Open),
     (Takeover::Ask.name(), Takeover::Ask),
@@ -32,6 +36,7 @@ const TAKEOVERS: &[(&str, Takeover)] = &[
 ];
 const YAW_FRAMES: &[(&str, DeviceYawFrame)] =
     &[("auto", DeviceYawFrame::Auto), ("vehicle", DeviceYawFrame::Vehicle), ("earth", DeviceYawFrame::Earth)];
+const SIGNS: &[(&str, Signs)] = &[("normal", Signs::Normal), ("reversed", Signs::Reversed)];
 const UNCLAIMED: &[(&str, bool)] = &[("open", true), ("closed", false)];
 const FIREWALLS: &[(&str, Firewall)] = &[("on", Firewall::On), ("warn", Firewall::Warn)];
 const ALTITUDES: &[(&str, AltitudeReference)] =
@@ -80,6 +85,7 @@ pub(super) struct Gimbal {
     pub takeover: Option<Located<Takeover>>,
     pub setpoint_rate_hz: Option<Located<u8>>,
     pub device_yaw_frame: Option<Located<DeviceYawFrame>>,
+    pub v1_sign: Option<Located<Signs>>,
     pub manual_pitch_rate_dps: Option<Located<f64>>,
     pub manual_yaw_rate_dps: Option<Located<f64>>,
 }
@@ -133,6 +139,7 @@ fn gimbal(section: &mut Section<'_>, place: Place) -> Gimbal {
         takeover: section.read("takeover", |raw| word(raw, TAKEOVERS)),
         setpoint_rate_hz: section.read("setpoint_rate_hz", |raw| whole(raw, 5..=50)),
         device_yaw_frame: section.read("device_yaw_frame", |raw| word(raw, YAW_FRAMES)),
+        v1_sign: section.read("v1_sign", |raw| word(raw, SIGNS)),
         manual_pitch_rate_dps: section.read("manual_pitch_rate_dps", manual_rate),
         manual_yaw_rate_dps: section.read("manual_yaw_rate_dps", manual_rate),
     }

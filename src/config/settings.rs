@@ -93,6 +93,7 @@ fn gimbal(gimbal: Gimbal, links: &[LinkSettings]) -> GimbalSettings {
         takeover: value_or(gimbal.takeover, default.takeover),
         setpoint_rate_hz: value_or(gimbal.setpoint_rate_hz, default.setpoint_rate_hz),
         device_yaw_frame: value_or(gimbal.device_yaw_frame, default.device_yaw_frame),
+        v1_sign: value_or(gimbal.v1_sign, default.v1_sign),
         manual_pitch_rate_dps: value_or(gimbal.manual_pitch_rate_dps, default.manual_pitch_rate_dps),
         manual_yaw_rate_dps: value_or(gimbal.manual_yaw_rate_dps, default.manual_yaw_rate_dps),
         name: default.name,

@@ -8,6 +8,8 @@ use crate::wire::ids::CapFlags;
 pub struct Capabilities {
     pub flags: CapFlags,
     pub limits: Limits,
+    /// It turns at a rate by itself; otherwise its angles are turned for it.
+    pub turns: bool,
 }
 
 impl Capabilities {
@@ -19,6 +21,6 @@ impl Capabilities {
             | CapFlags::HAS_PITCH_LOCK
             | CapFlags::HAS_YAW_AXIS
             | CapFlags::HAS_YAW_FOLLOW;
-        Self { flags, limits: Limits::default() }
+        Self { flags, limits: Limits::default(), turns: true }
     }
 }

@@ -1,5 +1,7 @@
 //! What the user may say of one gimbal.
 
+use super::mavlink_v1::packet::Signs;
+
 /// A `[[gimbal]]` entry.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GimbalSettings {
@@ -14,6 +16,8 @@ pub struct GimbalSettings {
     /// How often an active setpoint is repeated to the device, 5 to 50.
     pub setpoint_rate_hz: u8,
     pub device_yaw_frame: DeviceYawFrame,
+    /// Which way a v1 gimbal counts pitch and yaw.
+    pub v1_sign: Signs,
     /// Full deflection of manual control (288), degrees per second.
     pub manual_pitch_rate_dps: f64,
     pub manual_yaw_rate_dps: f64,
@@ -31,6 +35,7 @@ impl GimbalSettings {
             takeover: Takeover::Open,
             setpoint_rate_hz: 20,
             device_yaw_frame: DeviceYawFrame::Auto,
+            v1_sign: Signs::Normal,
             manual_pitch_rate_dps: 30.0,
             manual_yaw_rate_dps: 30.0,
         }
@@ -42,13 +47,23 @@ pub enum Family {
     /// Found by listening.
     Auto,
     MavlinkV2,
+    MavlinkV1,
 }
 
 impl Family {
+    /// Whether its gimbals are no v2 devices, so that their manager sends 283 and 285 for them.
+    pub const fn speaks_through_manager(self) -> bool {
+        match self {
+            Self::Auto | Self::MavlinkV2 => false,
+            Self::MavlinkV1 => true,
+        }
+    }
+
     pub const fn name(self) -> &'static str {
         match self {
             Self::Auto => "auto",
             Self::MavlinkV2 => "mavlink_v2",
+            Self::MavlinkV1 => "mavlink_v1",
         }
     }
 }

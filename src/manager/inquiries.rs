@@ -1,7 +1,7 @@
 //! What clients ask to be told: `REQUEST_MESSAGE` (512), `SET_MESSAGE_INTERVAL` (511), `GET_MESSAGE_INTERVAL` (510).
 //!
-//! 283 and 285 are the device's own, and whoever asks us for them is refused (D23: DENIED, since a client that reads
-//! UNSUPPORTED asks 25 times).
+//! 283 and 285 are a v2 device's own, and whoever asks us for them is refused (D23: DENIED, since a client that reads
+//! UNSUPPORTED asks 25 times); of a gimbal that is no v2 device they are ours.
 
 use super::commands::Outcome;
 use super::messages::{self, Interval};
@@ -34,6 +34,12 @@ impl GimbalManager {
                 let id = message_id(command, 2).unwrap_or(u32::MAX);
                 Box::new(self.message_interval(sender, id))
             }
+            Some(message::GIMBAL_DEVICE_INFORMATION) if self.voice.is_some() => {
+                self.device_information(now).ok_or(not_yet)?
+            }
+            Some(message::GIMBAL_DEVICE_ATTITUDE_STATUS) if self.voice.is_some() => {
+                self.device_attitude_status(now, around).ok_or(not_yet)?
+            }
             Some(message::HEARTBEAT) if command.is_directed() => {
                 let channels = (!to_everybody).then(|| sender.channel.into());
                 self.outputs.push_back(ManagerOutput::Heartbeat { channels });
@@ -56,10 +62,11 @@ impl GimbalManager {
         command: &Command,
     ) -> Result<Outcome, Refusal> {
         let micros = command.param(2).unwrap_or(0.0);
-        let schedule = match message_id(command, 1) {
-            Some(message::GIMBAL_MANAGER_STATUS) => &mut self.status_schedule,
-            Some(message::GIMBAL_MANAGER_INFORMATION) => &mut self.information_schedule,
-            id => return not_ours(command, id),
+        let schedule = match (message_id(command, 1), &mut self.voice) {
+            (Some(message::GIMBAL_MANAGER_STATUS), _) => &mut self.status_schedule,
+            (Some(message::GIMBAL_MANAGER_INFORMATION), _) => &mut self.information_schedule,
+            (Some(message::GIMBAL_DEVICE_ATTITUDE_STATUS), Some(voice)) => &mut voice.schedule,
+            (id, _) => return not_ours(command, id),
         };
         let set = schedule.set(now, sender.channel, micros);
         set.map_err(|_| Refusal::denied("invalid_interval"))?;
@@ -77,10 +84,11 @@ impl GimbalManager {
     }
 
     fn message_interval(&self, sender: Sender, message_id: u32) -> MavMessage {
-        let interval = match message_id {
-            message::HEARTBEAT => Interval::Every(std::time::Duration::from_secs(1)),
-            message::GIMBAL_MANAGER_STATUS => self.status_schedule.interval(sender.channel),
-            message::GIMBAL_MANAGER_INFORMATION => self.information_schedule.interval(sender.channel),
+        let interval = match (message_id, &self.voice) {
+            (message::HEARTBEAT, _) => Interval::Every(std::time::Duration::from_secs(1)),
+            (message::GIMBAL_MANAGER_STATUS, _) => self.status_schedule.interval(sender.channel),
+            (message::GIMBAL_MANAGER_INFORMATION, _) => self.information_schedule.interval(sender.channel),
+            (message::GIMBAL_DEVICE_ATTITUDE_STATUS, Some(voice)) => voice.schedule.interval(sender.channel),
             _ => Interval::NotAvailable,
         };
         messages::message_interval(message_id, interval)

@@ -65,8 +65,8 @@ impl Schedule {
         if entry.interval != interval {
             entry.interval = interval;
             entry.due = match interval {
-                _ if interval == self.default => next_multiple(now, DEFAULT_STATUS_INTERVAL),
-                Interval::Every(interval) => now + interval,
+                Interval::Every(every) if interval == self.default => next_multiple(now, every),
+                Interval::Every(every) => now + every,
                 Interval::Off | Interval::NotAvailable => now,
             };
         }

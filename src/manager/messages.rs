@@ -11,13 +11,13 @@ use crate::wire::dialect::{
     COMMAND_ACK_DATA, COMPONENT_INFORMATION_BASIC_DATA, CharArray, GIMBAL_MANAGER_INFORMATION_DATA,
     GIMBAL_MANAGER_STATUS_DATA, HEARTBEAT_DATA, MESSAGE_INTERVAL_DATA, MavMessage, STATUSTEXT_DATA,
 };
-use crate::wire::ids::{CapFlags, CommandResult, GimbalFlags, mav_autopilot, mav_type, protocol_capability};
+use crate::wire::ids::{CapFlags, CommandResult, GimbalFlags, mav_autopilot, protocol_capability};
 
-/// `HEARTBEAT` of a manager: an onboard controller that is no autopilot and has no modes.
-pub fn heartbeat(system_status: u8) -> MavMessage {
+/// `HEARTBEAT` of a manager of that `MAV_TYPE`, which is no autopilot and has no modes.
+pub fn heartbeat(mavtype: u8, system_status: u8) -> MavMessage {
     MavMessage::HEARTBEAT(HEARTBEAT_DATA {
         custom_mode: 0,
-        mavtype: mav_type::ONBOARD_CONTROLLER,
+        mavtype,
         autopilot: mav_autopilot::INVALID,
         base_mode: 0,
         system_status,

@@ -251,6 +251,16 @@ impl Tracking {
         self.source
     }
 
+    /// Whether yaw is held to North.
+    pub fn is_locked(&self) -> bool {
+        match self.aim {
+            Aim::Idle | Aim::Retract | Aim::Neutral => false,
+            Aim::Turn(turn) => turn.turning.yaw_frame == YawFrame::Earth,
+            Aim::Point(point) => point.frame == YawFrame::Earth,
+            Aim::Roi(_) => true,
+        }
+    }
+
     pub fn roi(&self) -> Option<Position> {
         match self.aim {
             Aim::Roi(roi) => Some(roi.place),

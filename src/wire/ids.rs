@@ -59,10 +59,12 @@ pub mod message {
     pub const AUTOPILOT_VERSION: u32 = 148;
     pub const MOUNT_CONFIGURE: u32 = 156;
     pub const MOUNT_CONTROL: u32 = 157;
+    pub const MOUNT_STATUS: u32 = 158;
     pub const RADIO: u32 = 166;
     pub const MESSAGE_INTERVAL: u32 = 244;
     pub const STATUSTEXT: u32 = 253;
     pub const CAMERA_INFORMATION: u32 = 259;
+    pub const MOUNT_ORIENTATION: u32 = 265;
     pub const GIMBAL_MANAGER_INFORMATION: u32 = 280;
     pub const GIMBAL_MANAGER_STATUS: u32 = 281;
     pub const GIMBAL_MANAGER_SET_ATTITUDE: u32 = 282;
@@ -183,6 +185,7 @@ pub mod mav_autopilot {
 /// `MAV_STATE`.
 pub mod mav_state {
     pub const BOOT: u8 = 1;
+    pub const CALIBRATING: u8 = 2;
     pub const STANDBY: u8 = 3;
     pub const ACTIVE: u8 = 4;
     pub const CRITICAL: u8 = 5;
@@ -193,6 +196,12 @@ pub mod mav_state {
 pub mod severity {
     pub const WARNING: u8 = 4;
     pub const NOTICE: u8 = 5;
+}
+
+/// `MAV_DATA_STREAM`.
+pub mod mav_data_stream {
+    pub const POSITION: u8 = 6;
+    pub const EXTRA1: u8 = 10;
 }
 
 /// `MAV_FRAME`, as far as positions come in it.

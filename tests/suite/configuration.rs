@@ -12,6 +12,7 @@ use nix::unistd::mkfifo;
 use gimbald::bridge::settings::{LinkSettings, Role, Settings, SystemId, Transport};
 use gimbald::config::settings::{DaemonSettings, HttpSettings};
 use gimbald::config::{self, problem::Problems};
+use gimbald::gimbals::mavlink_v1::packet::Signs;
 use gimbald::gimbals::settings::{DeviceYawFrame, Family, GimbalSettings, Takeover};
 use gimbald::manager::settings::{AltitudeReference, ControlSettings, Firewall};
 
@@ -68,7 +69,7 @@ name = "Gimbal"
 [[gimbal]]
 name = "camera"
 link = "gimbl"
-family = "mavlink_v1"
+family = "mavlink_v3"
 
 [htp]
 
@@ -87,7 +88,7 @@ lease_timeout_s = -1
         "c.toml:16: link.Gimbal.endpoint: missing; expected an endpoint, for example udpin:0.0.0.0:14550",
         r#"c.toml:17: link.Gimbal.name: found "Gimbal", the name in line 5; expected a name that differs from all others in more than case and - or _"#,
         r#"c.toml:21: gimbal.camera.link: found "gimbl"; expected the name of a link, one of gimbal, ground, Gimbal; did you mean gimbal?"#,
-        r#"c.toml:22: gimbal.camera.family: found "mavlink_v1"; expected auto or mavlink_v2; did you mean mavlink_v2?"#,
+        r#"c.toml:22: gimbal.camera.family: found "mavlink_v3"; expected auto, mavlink_v2 or mavlink_v1; did you mean mavlink_v2?"#,
         "c.toml:24: htp: unknown key; expected one of vehicle, link, gimbal, control, roi, http; did you mean http?",
         "c.toml:27: control.lease_timeout_s: found -1; expected a number of seconds from 0.001 to 3600",
     ];
@@ -237,7 +238,8 @@ fn numbers_have_ranges_and_kinds() {
         ("takeover = \"polite\"", "found \"polite\"; expected open, ask, priority or exclusive"),
         ("takeover = true", "found true; expected open, ask, priority or exclusive"),
         ("device_yaw_frame = \"erath\"", "found \"erath\"; expected auto, vehicle or earth; did you mean earth?"),
-        ("family = \"gremsy\"", "found \"gremsy\"; expected auto or mavlink_v2"),
+        ("v1_sign = \"negated\"", "found \"negated\"; expected normal or reversed"),
+        ("family = \"gremsy\"", "found \"gremsy\"; expected auto, mavlink_v2 or mavlink_v1"),
         ("link = 1", "found 1; expected the name of a link as text"),
     ] {
         let (key, _) = line.split_once(' ').expect("key and value");
@@ -570,6 +572,7 @@ manager_component_id = 200
 takeover = "ask"
 setpoint_rate_hz = 30
 device_yaw_frame = "earth"
+v1_sign = "reversed"
 manual_pitch_rate_dps = 12.5
 manual_yaw_rate_dps = 45
 [vehicle]
@@ -617,6 +620,7 @@ fn every_key_arrives_where_it_belongs() {
                 takeover: Takeover::Ask,
                 setpoint_rate_hz: 30,
                 device_yaw_frame: DeviceYawFrame::Earth,
+                v1_sign: Signs::Reversed,
                 manual_pitch_rate_dps: 12.5,
                 manual_yaw_rate_dps: 45.0,
             }],
@@ -686,6 +690,7 @@ fn variables_override_the_file() {
         ("GIMBALD__GIMBAL__NOSE-CAM__TAKEOVER", "ask"),
         ("GIMBALD__GIMBAL__NOSE_CAM__SETPOINT_RATE_HZ", "30"),
         ("GIMBALD__GIMBAL__NOSE_CAM__DEVICE_YAW_FRAME", "earth"),
+        ("GIMBALD__GIMBAL__NOSE_CAM__V1_SIGN", "reversed"),
         ("GIMBALD__GIMBAL__NOSE_CAM__MANUAL_PITCH_RATE_DPS", "12.5"),
         ("GIMBALD__GIMBAL__NOSE_CAM__MANUAL_YAW_RATE_DPS", "45"),
         ("GIMBALD__VEHICLE__SYSTEM_ID", "7"),

@@ -8,3 +8,4 @@ mod identity;
 mod manager;
 mod mavsdk_trace;
 mod own_commands;
+mod spoken_for;

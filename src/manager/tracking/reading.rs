@@ -77,7 +77,7 @@ impl Tracking {
         let radio_control = RadioControl::of_flags(flags);
         let stops_angles = stops && matches!(self.aim, Aim::Point(_)) && reference.is_some();
         let keeps_angles = stops_angles || radio_control == RadioControl::Exclusive;
-        if by_rates && !keeps_angles && situation.device_frame(hold) == hold {
+        if by_rates && !keeps_angles && capabilities.turns && situation.device_frame(hold) == hold {
             let rate = |axis: AxisDemand| axis.rate.unwrap_or(AngularRate::ZERO);
             let has_roll = capabilities.flags.contains(CapFlags::HAS_ROLL_AXIS);
             let turning = Turning {

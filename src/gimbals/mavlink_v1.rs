@@ -1,0 +1,7 @@
+//! Gimbals that speak MAVLink v1 mount commands, as ArduPilot's contract for them has it.
+
+pub mod driver;
+pub mod packet;
+pub mod sim;
+
+pub use driver::MavlinkV1Driver;

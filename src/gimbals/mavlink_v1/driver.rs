@@ -1,0 +1,311 @@
+//! The conversation with a v1 gimbal: it is told angles, and says where it looks, or does not.
+//!
+//! A v1 gimbal is heard by its heartbeats alone. It has no rates and no yaw from North, so both are turned into angles
+//! against the vehicle before they come here.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use super::packet::{self, MountControl, Signs};
+use crate::geometry::{Angle, AngularRate, Attitude, AxisLimits, GimbalAngles, Limits, VehicleFrame};
+use crate::gimbals::capabilities::Capabilities;
+use crate::gimbals::driver::{CommandOutcome, DriverOutput, GimbalDriver};
+use crate::gimbals::report::{GimbalAttitude, GimbalStatus, Identity, Report};
+use crate::gimbals::setpoint::Setpoint;
+use crate::timers::TimerTable;
+use crate::timestamp::Timestamp;
+use crate::wire::dialect::{COMMAND_LONG_DATA, HEARTBEAT_DATA, MOUNT_STATUS_DATA, MessageData};
+use crate::wire::ids::{CapFlags, FailureFlags, GimbalFlags, mav_state, message};
+use crate::wire::{Frame, MavId};
+
+/// A gimbal not heard for so long is lost: five heartbeats.
+pub const LOST_AFTER: Duration = Duration::from_secs(5);
+
+/// An unchanged setpoint is repeated so often.
+const REPEAT_EVERY: Duration = Duration::from_millis(500);
+/// And no setpoint is sent sooner after another.
+const LEAST_INTERVAL: Duration = Duration::from_millis(20);
+
+/// Without a report for so long, the attitude is that of a gimbal which does what it is told.
+const FEEDBACK_MISSING_AFTER: Duration = Duration::from_secs(2);
+const OPEN_LOOP_INTERVAL: Duration = Duration::from_millis(100);
+/// How fast such a gimbal is taken to be.
+const OPEN_LOOP_RATE: AngularRate = AngularRate::from_degrees_per_second(30.0);
+
+/// What is assumed of a v1 gimbal, which cannot say: three axes held to the horizon, yaw against the vehicle.
+fn capabilities() -> Capabilities {
+    let degrees = Angle::from_degrees;
+    Capabilities {
+        flags: CapFlags::HAS_RETRACT
+            | CapFlags::HAS_NEUTRAL
+            | CapFlags::HAS_ROLL_AXIS
+            | CapFlags::HAS_ROLL_LOCK
+            | CapFlags::HAS_PITCH_AXIS
+            | CapFlags::HAS_PITCH_LOCK
+            | CapFlags::HAS_YAW_AXIS
+            | CapFlags::HAS_YAW_FOLLOW,
+        // What ArduPilot lets pass to one.
+        limits: Limits {
+            roll: AxisLimits::new(degrees(-180.0), degrees(180.0)),
+            pitch: AxisLimits::new(degrees(-90.0), degrees(90.0)),
+            yaw: AxisLimits::new(degrees(-180.0), degrees(180.0)),
+        },
+        turns: false,
+    }
+}
+
+/// Drives one v1 gimbal.
+#[derive(Debug)]
+pub struct MavlinkV1Driver {
+    signs: Signs,
+    device: Option<MavId>,
+    alive: bool,
+    /// It says that it is ready for angles; what it is told before is kept for it.
+    ready: bool,
+    wanted: Option<MountControl>,
+    sent: Option<(Timestamp, MountControl)>,
+    feedback: Feedback,
+    /// Where it is taken to look while it does not say so.
+    assumed: GimbalAngles,
+    assumed_at: Timestamp,
+    timers: TimerTable<Timer>,
+    outputs: VecDeque<DriverOutput>,
+}
+
+/// Who tells where it looks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Feedback {
+    /// Nobody yet.
+    Awaited,
+    /// `MOUNT_ORIENTATION`, which is believed rather than `MOUNT_STATUS`.
+    Orientation,
+    Status,
+    /// Nobody: it is taken to do what it is told.
+    OpenLoop,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Timer {
+    /// When to call the gimbal lost.
+    Lost,
+    /// When to tell it again, or what had to wait.
+    Send,
+    /// When to do without its reports.
+    FeedbackMissing,
+    /// When to report where it is taken to look.
+    OpenLoop,
+}
+
+impl MavlinkV1Driver {
+    pub fn new(signs: Signs) -> Self {
+        Self {
+            signs,
+            device: None,
+            alive: false,
+            ready: false,
+            wanted: None,
+            sent: None,
+            feedback: Feedback::Awaited,
+            assumed: GimbalAngles::default(),
+            assumed_at: Timestamp::ZERO,
+            timers: TimerTable::default(),
+            outputs: VecDeque::new(),
+        }
+    }
+
+    fn handle_heard(&mut self, now: Timestamp, device: MavId) {
+        self.timers.set(Timer::Lost, now + LOST_AFTER);
+        if self.alive {
+            return;
+        }
+        self.alive = true;
+        self.report(Report::Alive { device });
+        self.report(Report::Known(self.identity(), capabilities()));
+        self.feedback = Feedback::Awaited;
+        self.timers.set(Timer::FeedbackMissing, now + FEEDBACK_MISSING_AFTER);
+    }
+
+    fn handle_heartbeat(&mut self, now: Timestamp, heartbeat: &HEARTBEAT_DATA) {
+        // "system_status ACTIVE only when ready for angle targets"; many never set it, so only what says otherwise counts.
+        let ready = !matches!(heartbeat.system_status, mav_state::BOOT | mav_state::CALIBRATING | mav_state::POWEROFF);
+        if ready && !self.ready {
+            self.ready = true;
+            self.send_when_due(now);
+        }
+        self.ready = ready;
+    }
+
+    fn handle_attitude(&mut self, now: Timestamp, from_status: bool, attitude: Attitude<VehicleFrame>) {
+        if from_status && self.feedback == Feedback::Orientation {
+            return;
+        }
+        let was_open_loop = self.feedback == Feedback::OpenLoop;
+        self.feedback = if from_status { Feedback::Status } else { Feedback::Orientation };
+        self.timers.set(Timer::FeedbackMissing, now + FEEDBACK_MISSING_AFTER);
+        self.timers.cancel(Timer::OpenLoop);
+        self.assumed = attitude.gimbal_angles();
+        self.assumed_at = now;
+        if was_open_loop {
+            self.report(Report::Known(self.identity(), capabilities()));
+        }
+        self.report_attitude(attitude);
+    }
+
+    fn report_attitude(&mut self, attitude: Attitude<VehicleFrame>) {
+        let mut flags = GimbalFlags::YAW_IN_VEHICLE_FRAME;
+        flags |= match self.sent {
+            Some((_, MountControl::Retract)) => GimbalFlags::RETRACT,
+            Some((_, MountControl::Neutral)) => GimbalFlags::NEUTRAL | GimbalFlags::ROLL_LOCK | GimbalFlags::PITCH_LOCK,
+            Some((_, MountControl::Angles(_))) | None => GimbalFlags::ROLL_LOCK | GimbalFlags::PITCH_LOCK,
+        };
+        self.report(Report::Attitude(GimbalStatus {
+            attitude: GimbalAttitude::InVehicleFrame(attitude),
+            rates: [None; 3],
+            heading: None,
+            flags,
+            failures: FailureFlags::empty(),
+            accepts_earth_yaw: false,
+        }));
+    }
+
+    fn identity(&self) -> Identity {
+        let custom_name = if self.feedback == Feedback::OpenLoop { "open loop" } else { "" };
+        Identity { model: "MAVLink v1".to_owned(), custom_name: custom_name.to_owned(), ..Identity::default() }
+    }
+
+    /// Sends what is wanted, or arranges for it.
+    fn send_when_due(&mut self, now: Timestamp) {
+        let (Some(device), Some(wanted), true, true) = (self.device, self.wanted, self.alive, self.ready) else {
+            return;
+        };
+        let due = match self.sent {
+            Some((at, sent)) => at + if sent == wanted { REPEAT_EVERY } else { LEAST_INTERVAL },
+            None => now,
+        };
+        if due > now {
+            self.timers.set(Timer::Send, due);
+            return;
+        }
+        self.carry_assumed_on(now);
+        self.sent = Some((now, wanted));
+        self.timers.set(Timer::Send, now + REPEAT_EVERY);
+        let message = packet::mount_control(device, wanted, self.signs);
+        self.outputs.push_back(DriverOutput::Message(Box::new(message)));
+    }
+
+    /// Moves the gimbal that says nothing to where it was told to go.
+    fn carry_assumed_on(&mut self, now: Timestamp) {
+        let most = OPEN_LOOP_RATE.over(now.since(self.assumed_at));
+        self.assumed_at = now;
+        let target = match self.sent {
+            Some((_, MountControl::Angles(angles))) => angles,
+            Some((_, MountControl::Retract | MountControl::Neutral)) => GimbalAngles::default(),
+            None => return,
+        };
+        let step = |at: Angle, to: Angle| at + (to - at).clamp(-most, most);
+        self.assumed = GimbalAngles {
+            roll: step(self.assumed.roll, target.roll),
+            pitch: step(self.assumed.pitch, target.pitch),
+            yaw: step(self.assumed.yaw, target.yaw),
+        };
+    }
+
+    fn report_assumed(&mut self, now: Timestamp) {
+        self.carry_assumed_on(now);
+        self.timers.set(Timer::OpenLoop, now + OPEN_LOOP_INTERVAL);
+        self.report_attitude(Attitude::from_gimbal_angles(self.assumed));
+    }
+
+    fn report(&mut self, report: Report) {
+        self.outputs.push_back(DriverOutput::Report(report));
+    }
+
+    fn lose(&mut self) {
+        self.alive = false;
+        self.ready = false;
+        // What it is told next is told anew, and not before it is asked for again.
+        self.wanted = None;
+        self.sent = None;
+        for timer in [Timer::Lost, Timer::Send, Timer::FeedbackMissing, Timer::OpenLoop] {
+            self.timers.cancel(timer);
+        }
+        self.report(Report::Lost);
+    }
+}
+
+impl GimbalDriver for MavlinkV1Driver {
+    fn adopt(&mut self, _now: Timestamp, device: MavId) {
+        let outputs = std::mem::take(&mut self.outputs);
+        *self = Self { device: Some(device), outputs, ..Self::new(self.signs) };
+    }
+
+    fn handle_received(&mut self, now: Timestamp, frame: &Frame<'_>) {
+        let Some(device) = self.device.filter(|device| *device == frame.source()) else { return };
+        match frame.message_id() {
+            message::HEARTBEAT => {
+                let Some(heartbeat) = frame.decode::<HEARTBEAT_DATA>() else { return };
+                self.handle_heard(now, device);
+                self.handle_heartbeat(now, &heartbeat);
+            }
+            message::MOUNT_ORIENTATION | message::MOUNT_STATUS => {
+                self.handle_heard(now, device);
+                if let Some(attitude) = packet::read_attitude(frame) {
+                    self.handle_attitude(now, frame.message_id() == MOUNT_STATUS_DATA::ID, attitude);
+                }
+            }
+            _ => {}
+        }
+        self.handle_timeout(now);
+    }
+
+    fn handle_link_lost(&mut self) {
+        if self.alive {
+            self.lose();
+        }
+    }
+
+    fn handle_setpoint(&mut self, now: Timestamp, setpoint: Setpoint) {
+        self.wanted = Some(match setpoint {
+            Setpoint::Retract => MountControl::Retract,
+            Setpoint::Neutral => MountControl::Neutral,
+            Setpoint::Point(pointing) => MountControl::Angles(GimbalAngles {
+                roll: pointing.roll,
+                pitch: pointing.pitch,
+                yaw: pointing.yaw.angle(),
+            }),
+            // It has no rates: whoever decides turns the angles.
+            Setpoint::Turn(_) => return,
+        });
+        self.send_when_due(now);
+    }
+
+    /// It gives out none.
+    fn handle_command_outcome(&mut self, _now: Timestamp, _command: &COMMAND_LONG_DATA, _outcome: CommandOutcome) {}
+
+    fn handle_timeout(&mut self, now: Timestamp) {
+        while let Some(timer) = self.timers.pop_due(now) {
+            match timer {
+                Timer::Lost => self.lose(),
+                Timer::Send => self.send_when_due(now),
+                Timer::FeedbackMissing => {
+                    self.feedback = Feedback::OpenLoop;
+                    self.assumed_at = now;
+                    self.report(Report::Known(self.identity(), capabilities()));
+                    self.report_assumed(now);
+                }
+                Timer::OpenLoop => self.report_assumed(now),
+            }
+        }
+    }
+
+    fn poll_output(&mut self) -> Option<DriverOutput> {
+        self.outputs.pop_front()
+    }
+
+    fn poll_timeout(&self) -> Option<Timestamp> {
+        self.timers.next().map(|(at, _)| at)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,367 @@
+//! A simulated v1 gimbal, as ArduPilot's contract for MAVLink gimbals describes one.
+//!
+//! It waits for the heartbeat of a vehicle, takes its system id, and then obeys `DO_MOUNT_CONTROL`. It knows nothing of
+//! gimbal devices and managers.
+
+use std::time::Duration;
+
+use super::packet::Signs;
+use crate::geometry::{Angle, AxisLimits, Limits};
+use crate::sim::command::Command;
+use crate::sim::outbox::Outbox;
+use crate::sim::parameters::{IntegerEncoding, ParameterServer, ParameterValue};
+use crate::sim::peer::{Peer, PlatformMotion};
+use crate::sim::plant::{Drive, Plant, PlantSettings, YawHold};
+use crate::sim::streams::Streams;
+use crate::timestamp::Timestamp;
+use crate::wire::decoder::Patience;
+use crate::wire::dialect::{
+    ATTITUDE_DATA, HEARTBEAT_DATA, MOUNT_ORIENTATION_DATA, MOUNT_STATUS_DATA, REQUEST_DATA_STREAM_DATA,
+};
+use crate::wire::ids::{
+    CommandResult, command, component, mav_autopilot, mav_data_stream, mav_state, mav_type, message, mount_mode,
+};
+use crate::wire::{Frame, MavId, StreamDecoder};
+
+const HEARTBEAT_INTERVAL: Duration = Duration::from_secs(1);
+const DECODER_PATIENCE: Duration = Duration::from_millis(100);
+
+/// The motors take so long to find themselves; until then it is not `MAV_STATE_ACTIVE`.
+const START_UP: Duration = Duration::from_secs(2);
+
+/// Everything that differs from one v1 gimbal to another.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DeviceSettings {
+    pub component_id: u8,
+    pub system_id: SystemId,
+    pub signs: Signs,
+    pub feedback: Feedback,
+    /// Asks the vehicle for `ATTITUDE` ten times a second and `GLOBAL_POSITION_INT` twice, as the contract allows.
+    pub asks_for_streams: bool,
+    pub plant: PlantSettings,
+}
+
+/// Under which system id the gimbal speaks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SystemId {
+    /// That of the first vehicle it hears; silent until then.
+    Adopt,
+    /// From the start, whoever is there.
+    Fixed(u8),
+}
+
+/// How it says where it looks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Feedback {
+    /// `MOUNT_ORIENTATION`, ten times a second.
+    Orientation,
+    /// `MOUNT_STATUS`, four times a second.
+    Status,
+    Nothing,
+}
+
+impl Default for DeviceSettings {
+    fn default() -> Self {
+        let degrees = Angle::from_degrees;
+        Self {
+            component_id: component::GIMBAL,
+            system_id: SystemId::Adopt,
+            signs: Signs::Normal,
+            feedback: Feedback::Orientation,
+            asks_for_streams: false,
+            plant: PlantSettings {
+                limits: Limits {
+                    roll: AxisLimits::new(degrees(-45.0), degrees(45.0)),
+                    pitch: AxisLimits::new(degrees(-90.0), degrees(45.0)),
+                    yaw: AxisLimits::new(degrees(-180.0), degrees(180.0)),
+                },
+                ..PlantSettings::default()
+            },
+        }
+    }
+}
+
+/// A simulated v1 gimbal.
+#[derive(Debug)]
+pub struct Device {
+    settings: DeviceSettings,
+    boot: Timestamp,
+    /// The vehicle it belongs to.
+    vehicle: Option<MavId>,
+    outbox: Outbox,
+    decoder: StreamDecoder,
+    streams: Streams,
+    parameters: ParameterServer,
+    plant: Plant,
+    mode: u8,
+    is_speaking: bool,
+    /// The vehicle's motion comes from outside, and not from its `ATTITUDE`.
+    is_carried: bool,
+}
+
+impl Device {
+    pub fn new(now: Timestamp, settings: DeviceSettings) -> Self {
+        let system = match settings.system_id {
+            SystemId::Adopt => 0,
+            SystemId::Fixed(system) => system,
+        };
+        let limit = |angle: fn(AxisLimits) -> Angle| {
+            let angle = settings.plant.limits.pitch.map(angle);
+            ParameterValue::Float(angle.map_or(f32::NAN, |angle| angle.degrees() as f32))
+        };
+        let parameters = vec![("SIM_TILT_MAX", limit(AxisLimits::max)), ("SIM_TILT_MIN", limit(AxisLimits::min))];
+        Self {
+            boot: now,
+            vehicle: None,
+            outbox: Outbox::new(MavId::new(system, settings.component_id)),
+            decoder: StreamDecoder::new(Patience::Fixed(DECODER_PATIENCE)),
+            streams: Streams::default(),
+            parameters: ParameterServer::new(parameters, IntegerEncoding::Bytewise),
+            plant: Plant::new(now, settings.plant.clone()),
+            mode: mount_mode::MAVLINK_TARGETING,
+            is_speaking: false,
+            is_carried: false,
+            settings,
+        }
+    }
+
+    pub fn id(&self) -> MavId {
+        self.outbox.source()
+    }
+
+    /// The mechanics, to look at.
+    pub fn plant(&self) -> &Plant {
+        &self.plant
+    }
+
+    fn start_speaking(&mut self, now: Timestamp) {
+        if self.is_speaking {
+            return;
+        }
+        self.is_speaking = true;
+        self.streams.add(message::HEARTBEAT, Some(HEARTBEAT_INTERVAL), now);
+        match self.settings.feedback {
+            Feedback::Orientation => {
+                self.streams.add(message::MOUNT_ORIENTATION, Some(Duration::from_millis(100)), now);
+            }
+            Feedback::Status => self.streams.add(message::MOUNT_STATUS, Some(Duration::from_millis(250)), now),
+            Feedback::Nothing => {}
+        }
+    }
+
+    fn handle_frame(&mut self, now: Timestamp, frame: &Frame<'_>) {
+        if let Some(heartbeat) = frame.decode::<HEARTBEAT_DATA>() {
+            self.handle_heartbeat(now, frame.source(), &heartbeat);
+            return;
+        }
+        if self.vehicle == Some(frame.source())
+            && let Some(attitude) = frame.decode::<ATTITUDE_DATA>()
+        {
+            self.ride(now, &attitude);
+        }
+        if !self.is_speaking || !frame.target().includes(self.id()) {
+            return;
+        }
+        if let Some(command) = Command::read(frame) {
+            self.handle_command(now, &command);
+        } else {
+            self.parameters.handle_frame(now, frame, &mut self.outbox);
+        }
+    }
+
+    /// "Wait for a HEARTBEAT. Ignore type 6 (GCS) … Remember source sysid/compid. Adopt that sysid."
+    fn handle_heartbeat(&mut self, now: Timestamp, source: MavId, heartbeat: &HEARTBEAT_DATA) {
+        if self.vehicle.is_some() || mav_type::NOT_A_VEHICLE.contains(&heartbeat.mavtype) {
+            return;
+        }
+        self.vehicle = Some(source);
+        if self.settings.system_id == SystemId::Adopt {
+            self.outbox.set_system(source.system);
+        }
+        self.start_speaking(now);
+        if self.settings.asks_for_streams {
+            for (req_stream_id, req_message_rate) in [(mav_data_stream::EXTRA1, 10), (mav_data_stream::POSITION, 2)] {
+                self.outbox.send(&REQUEST_DATA_STREAM_DATA {
+                    req_message_rate,
+                    target_system: source.system,
+                    target_component: source.component,
+                    req_stream_id,
+                    start_stop: 1,
+                });
+            }
+        }
+    }
+
+    fn handle_command(&mut self, now: Timestamp, command: &Command) {
+        let result = match command.number {
+            command::DO_MOUNT_CONTROL => self.mount_control(command),
+            command::DO_MOUNT_CONFIGURE => self.set_mode(command.params[0]),
+            command::SET_MESSAGE_INTERVAL => {
+                let id = command.message_id();
+                let known = matches!(id, message::MOUNT_ORIENTATION | message::MOUNT_STATUS);
+                if known && !self.streams.contains(id) {
+                    self.streams.add(id, None, now);
+                }
+                if known && self.streams.set_interval(now, id, command.params[1]) {
+                    CommandResult::Accepted
+                } else {
+                    CommandResult::Unsupported
+                }
+            }
+            _ => CommandResult::Unsupported,
+        };
+        if command.is_directed() || result == CommandResult::Accepted {
+            command.acknowledge(&mut self.outbox, result);
+        }
+    }
+
+    /// A float cast saturates, and turns NaN into 0.
+    fn set_mode(&mut self, mode: f64) -> CommandResult {
+        match mode.round() as u8 {
+            mode @ (mount_mode::RETRACT | mount_mode::NEUTRAL) => {
+                self.mode = mode;
+                let ahead = Drive::To { angle: Angle::ZERO, speed: None };
+                self.plant.set_roll(ahead);
+                self.plant.set_pitch(ahead);
+                self.plant.set_yaw(YawHold::Vehicle, ahead);
+                CommandResult::Accepted
+            }
+            mode @ (mount_mode::MAVLINK_TARGETING | mount_mode::RC_TARGETING) => {
+                self.mode = mode;
+                CommandResult::Accepted
+            }
+            _ => CommandResult::Failed,
+        }
+    }
+
+    fn mount_control(&mut self, command: &Command) -> CommandResult {
+        let [pitch, roll, yaw, .., mode] = command.params;
+        let result = self.set_mode(mode);
+        if result != CommandResult::Accepted || self.mode != mount_mode::MAVLINK_TARGETING {
+            return result;
+        }
+        if ![pitch, roll, yaw].iter().all(|degrees| degrees.is_finite()) {
+            return CommandResult::Denied;
+        }
+        let sign = match self.settings.signs {
+            Signs::Normal => 1.0,
+            Signs::Reversed => -1.0,
+        };
+        let to = |degrees: f64| Drive::To { angle: Angle::from_degrees(degrees), speed: None };
+        self.plant.set_pitch(to(sign * pitch));
+        self.plant.set_roll(to(roll));
+        self.plant.set_yaw(YawHold::Vehicle, to(sign * yaw));
+        CommandResult::Accepted
+    }
+
+    fn ride(&mut self, now: Timestamp, attitude: &ATTITUDE_DATA) {
+        let numbers = [attitude.yaw, attitude.yawspeed, attitude.rollspeed, attitude.pitchspeed];
+        if self.is_carried || !numbers.iter().all(|number| number.is_finite()) {
+            return;
+        }
+        let [yaw, yaw_rate, roll_rate, pitch_rate] = numbers.map(f64::from);
+        let rate = crate::geometry::AngularRate::from_radians_per_second;
+        let heading = Angle::from_radians(yaw).nearest_to(self.plant.platform_heading(now));
+        self.plant.set_platform(
+            now,
+            PlatformMotion {
+                heading,
+                heading_rate: rate(yaw_rate),
+                roll_rate: rate(roll_rate),
+                pitch_rate: rate(pitch_rate),
+            },
+        );
+    }
+
+    fn send_due(&mut self, now: Timestamp) {
+        while let Some(id) = self.streams.pop_due(now) {
+            self.report(now, id);
+        }
+        self.parameters.handle_timeout(now, &mut self.outbox);
+    }
+
+    fn report(&mut self, now: Timestamp, id: u32) {
+        let pose = self.plant.measure(now);
+        let up = now.since(self.boot);
+        match id {
+            message::HEARTBEAT => self.outbox.send(&HEARTBEAT_DATA {
+                custom_mode: 0,
+                mavtype: mav_type::GIMBAL,
+                autopilot: mav_autopilot::GENERIC,
+                base_mode: 0,
+                system_status: if up < START_UP { mav_state::BOOT } else { mav_state::ACTIVE },
+                mavlink_version: 3,
+            }),
+            message::MOUNT_ORIENTATION => {
+                let heading = self.plant.platform_heading(now);
+                self.outbox.send(&MOUNT_ORIENTATION_DATA {
+                    time_boot_ms: (Timestamp::ZERO + up).boot_ms(),
+                    roll: pose.roll.degrees() as f32,
+                    pitch: pose.pitch.degrees() as f32,
+                    yaw: pose.yaw.wrapped().degrees() as f32,
+                    yaw_absolute: (pose.yaw + heading).wrapped().degrees() as f32,
+                });
+            }
+            message::MOUNT_STATUS => {
+                let hundredths = |angle: Angle| (angle.degrees() * 100.0).round() as i32;
+                self.outbox.send(&MOUNT_STATUS_DATA {
+                    pointing_a: hundredths(pose.pitch),
+                    pointing_b: hundredths(pose.roll),
+                    pointing_c: hundredths(pose.yaw.wrapped()),
+                    target_system: 0,
+                    target_component: 0,
+                    mount_mode: self.mode,
+                });
+            }
+            _ => {}
+        }
+    }
+
+    fn read_frames(&mut self, now: Timestamp) {
+        let mut decoder = std::mem::take(&mut self.decoder);
+        while let Some(frame) = decoder.next_frame() {
+            self.handle_frame(now, &frame);
+        }
+        self.decoder = decoder;
+    }
+}
+
+impl Peer for Device {
+    fn handle_received(&mut self, now: Timestamp, bytes: &[u8]) {
+        self.plant.advance(now);
+        self.decoder.push(now, bytes);
+        self.read_frames(now);
+        self.send_due(now);
+    }
+
+    fn handle_timeout(&mut self, now: Timestamp) {
+        self.plant.advance(now);
+        if matches!(self.settings.system_id, SystemId::Fixed(_)) {
+            self.start_speaking(now);
+        }
+        if self.decoder.poll_timeout().is_some_and(|at| at <= now) {
+            self.decoder.handle_timeout(now);
+            self.read_frames(now);
+        }
+        self.send_due(now);
+    }
+
+    fn poll_output(&mut self) -> Option<Vec<u8>> {
+        self.outbox.poll()
+    }
+
+    fn poll_timeout(&self) -> Option<Timestamp> {
+        let timeouts = [self.streams.poll_timeout(), self.parameters.poll_timeout(), self.decoder.poll_timeout()];
+        timeouts.into_iter().flatten().min()
+    }
+
+    fn handle_reboot(&mut self, now: Timestamp) {
+        *self = Self::new(now, self.settings.clone());
+    }
+
+    fn handle_disturbance(&mut self, now: Timestamp, motion: PlatformMotion) {
+        self.is_carried = true;
+        self.plant.advance(now);
+        self.plant.set_platform(now, motion);
+    }
+}
