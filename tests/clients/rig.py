@@ -68,17 +68,18 @@ def get(url):
 class Process:
     """A child that does not outlive this script; what it says goes into a log file."""
 
-    def __init__(self, name, arguments, log):
+    def __init__(self, name, arguments, log, **options):
         self.name = name
         self.log = log
         libc = ctypes.CDLL(None)
+        options.setdefault("stdin", subprocess.DEVNULL)
         with open(log, "wb") as output:
             self._child = subprocess.Popen(
                 arguments,
-                stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=subprocess.STDOUT,
                 preexec_fn=lambda: libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL),
+                **options,
             )
 
     def check(self):
