@@ -5,6 +5,8 @@
 use super::problem::Problem;
 use super::reader::bare;
 use super::schema::Gimbal;
+use crate::gimbals::settings::DeviceYawFrame;
+use crate::manager::voice::LAST_NUMBER;
 
 /// The managers that need no setting: ONBOARD_COMPUTER to ONBOARD_COMPUTER4.
 const AUTOMATIC: [u8; 4] = [191, 192, 193, 194];
@@ -12,7 +14,7 @@ const AUTOMATIC: [u8; 4] = [191, 192, 193, 194];
 /// Why the manager of a gimbal may not have a component id, as "component … is …".
 fn reserved(id: u8, gimbal: &Gimbal) -> Option<&'static str> {
     // The manager of a gimbal that is no v2 device speaks for the device, too.
-    let speaks_for_device = gimbal.family.as_ref().is_some_and(|family| family.value.speaks_through_manager());
+    let speaks_for_device = speaks_through_manager(gimbal);
     match id {
         100..=105 => Some("a camera's"),
         154 | 171..=175 if !speaks_for_device => Some("a gimbal device's"),
@@ -23,6 +25,27 @@ fn reserved(id: u8, gimbal: &Gimbal) -> Option<&'static str> {
 pub(super) fn check(gimbals: &[Gimbal], problems: &mut Vec<Problem>) {
     check_managers(gimbals, problems);
     check_devices(gimbals, problems);
+    check_numbers(gimbals, problems);
+}
+
+fn speaks_through_manager(gimbal: &Gimbal) -> bool {
+    gimbal.family.as_ref().is_some_and(|family| family.value.speaks_through_manager())
+}
+
+/// Gimbals that are no v2 devices have the device ids 1 to 6, and take yaw from the vehicle's nose only.
+fn check_numbers(gimbals: &[Gimbal], problems: &mut Vec<Problem>) {
+    for gimbal in gimbals.iter().filter(|gimbal| speaks_through_manager(gimbal)) {
+        if let Some(frame) = gimbal.device_yaw_frame.as_ref().filter(|frame| frame.value == DeviceYawFrame::Earth) {
+            let found = format!("found {}, which a gimbal of this family cannot have", frame.shown);
+            problems.push(frame.problem(found, "auto or vehicle"));
+        }
+    }
+    let mut numbered = gimbals.iter().filter(|gimbal| speaks_through_manager(gimbal));
+    if let Some(family) = numbered.nth(usize::from(LAST_NUMBER)).and_then(|gimbal| gimbal.family.as_ref()) {
+        let found =
+            format!("found {}, the family of gimbals that are no v2 devices, for the seventh time", family.shown);
+        problems.push(family.problem(found, "at most 6 gimbals of such families"));
+    }
 }
 
 fn check_managers(gimbals: &[Gimbal], problems: &mut Vec<Problem>) {

@@ -310,6 +310,30 @@ fn managers_have_ids_of_their_own() {
     );
 }
 
+/// Device ids 1 to 6 are for gimbals that are no v2 devices; their manager may have the component id of a gimbal, and they
+/// know no yaw from North.
+#[test]
+fn gimbals_that_are_no_v2_devices_have_numbers() {
+    let entry = |number: usize| {
+        let manager = 200 + number;
+        format!("[[gimbal]]\nname = \"g{number}\"\nfamily = \"mavlink_v1\"\nmanager_component_id = {manager}\n")
+    };
+    let entries = |count: usize| (0..count).map(entry).collect::<String>();
+    assert_eq!(check(&format!("{LINK}{}", entries(6)), &[]).code, Some(0));
+    assert_refused(
+        &entries(7),
+        &["c.toml:31: gimbal.g6.family: found \"mavlink_v1\", the family of gimbals that are no v2 devices, for the \
+             seventh time; expected at most 6 gimbals of such families"],
+    );
+    let v1 = |lines: &str| format!("[[gimbal]]\nname = \"a\"\nfamily = \"mavlink_v1\"\n{lines}");
+    assert_eq!(check(&format!("{LINK}{}", v1("manager_component_id = 154\n")), &[]).code, Some(0));
+    assert_refused(
+        &v1("device_yaw_frame = \"earth\"\n"),
+        &["c.toml:8: gimbal.a.device_yaw_frame: found \"earth\", which a gimbal of this family cannot have; expected \
+             auto or vehicle"],
+    );
+}
+
 #[test]
 fn devices_have_ids_of_their_own_on_their_link() {
     // The entry of b begins in the line after that of a.
