@@ -34,7 +34,7 @@ use crate::wire::dialect::MavMessage;
 use crate::wire::ids::{CommandResult, FailureFlags, GimbalFlags};
 use crate::wire::{MavId, Target};
 use commands::LastCommand;
-use control::{Change, Control, PRIMARY_SILENCE, Place, Policy};
+use control::{Change, Control, PRIMARY_SILENCE, Place, Policy, Voice};
 use events::{Event, RatesEnd};
 use intervals::{DEFAULT_STATUS_INTERVAL, Schedule};
 use messages::Interval;
@@ -444,7 +444,7 @@ impl GimbalManager {
         }
     }
 
-    fn gate(&self, now: Timestamp, sender: MavId, around: Surroundings<'_>) -> Result<(), Refusal> {
+    fn gate(&self, now: Timestamp, sender: MavId, around: Surroundings<'_>) -> Result<Voice, Refusal> {
         if around.other_vehicle {
             return Err(Refusal::denied("other_vehicle"));
         }
@@ -472,7 +472,12 @@ impl GimbalManager {
         demand: &Demand,
         around: Surroundings<'_>,
     ) -> Result<(), Refusal> {
-        self.gate(now, sender, around)?;
+        let voice = self.gate(now, sender, around)?;
+        let nudges =
+            matches!(voice, Voice::Second { .. }) && demand.is_rates_only() && self.tracking.can_be_nudged_by(sender);
+        if !nudges {
+            voice.needs_whole()?;
+        }
         let capabilities = *self.steerable()?;
         let demand = match demand.kind {
             DemandKind::Manual => manual::scale(demand, &capabilities.limits, &self.settings),
@@ -480,6 +485,9 @@ impl GimbalManager {
         };
         let situation = self.situation(now, &capabilities, around);
         let timeouts = self.timeouts();
+        if nudges {
+            return self.tracking.nudge(now, sender, &demand, &situation, timeouts);
+        }
         self.tracking.demand(now, sender, &demand, &situation, timeouts)?;
         self.note_demand(now, sender);
         Ok(())
@@ -529,9 +537,7 @@ impl GimbalManager {
                 self.outputs.push_back(ManagerOutput::Steer(setpoint));
             }
         }
-        if self.tracking.take_timed_out()
-            && let Some(who) = self.tracking.source()
-        {
+        if let Some(who) = self.tracking.take_timed_out() {
             self.tell(Event::RatesEnded { who, end: RatesEnd::TimedOut });
         }
         let flags = self.flags();
@@ -574,6 +580,10 @@ impl GimbalManager {
         }
         if primary_changed || source_lost_its_place {
             self.tracking.stop_rates(now);
+        }
+        // Who becomes primary finds the camera where it moved it.
+        if self.tracking.nudged_by().is_some_and(|by| !holders.contains(&Some(by))) {
+            self.tracking.end_nudge();
         }
         self.broadcast_status(now);
         for change in changes {

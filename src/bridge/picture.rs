@@ -170,7 +170,15 @@ impl Bridge {
 fn setpoint_snapshot(tracking: &Tracking) -> Option<SetpointSnapshot> {
     let mode = tracking.mode()?.to_owned();
     let source = tracking.source().map(|source| source.to_string());
-    let bare = SetpointSnapshot { mode, source, stale: tracking.is_stale(), ..SetpointSnapshot::default() };
+    let (pitch, yaw) = tracking.nudged();
+    let bare = SetpointSnapshot {
+        mode,
+        source,
+        stale: tracking.is_stale(),
+        nudge_pitch_deg: pitch.degrees(),
+        nudge_yaw_deg: yaw.degrees(),
+        ..SetpointSnapshot::default()
+    };
     let frame_name = |frame: YawFrame| match frame {
         YawFrame::Vehicle => "vehicle".to_owned(),
         YawFrame::Earth => "earth".to_owned(),

@@ -18,6 +18,7 @@ pub struct Snapshot {
     pub gimbals: Vec<GimbalSnapshot>,
     pub conflicts: Vec<String>,
     /// What happened lately, the latest first.
+    #[serde(default)]
     pub events: Vec<EventSnapshot>,
 }
 
@@ -124,6 +125,7 @@ pub struct GimbalSnapshot {
     /// Who gets primary control back from the autopilot, which has borrowed it.
     pub lender: Option<String>,
     /// Who may take control from a holder: `open`, `ask`, `priority` or `exclusive`.
+    #[serde(default)]
     pub takeover: String,
     pub roi: Option<RoiSnapshot>,
     pub flags: Vec<String>,
@@ -156,6 +158,11 @@ pub struct SetpointSnapshot {
     /// It is held as it is, because the position or heading of the vehicle that it follows is not known any more.
     #[serde(default)]
     pub stale: bool,
+    /// How far the holder of secondary control has moved the camera from there; part of the angles above.
+    #[serde(default)]
+    pub nudge_pitch_deg: f64,
+    #[serde(default)]
+    pub nudge_yaw_deg: f64,
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

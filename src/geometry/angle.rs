@@ -139,6 +139,14 @@ impl AngularRate {
     }
 }
 
+impl Add for AngularRate {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self::from_radians_per_second(self.radians_per_second + other.radians_per_second)
+    }
+}
+
 impl Neg for AngularRate {
     type Output = Self;
 

@@ -96,6 +96,8 @@ fn held_gimbal() -> GimbalSnapshot {
             yaw_rate_dps: None,
             source: Some("255/190".into()),
             stale: false,
+            nudge_pitch_deg: -2.5,
+            nudge_yaw_deg: 0.0,
         }),
         primary: Some("255/190".into()),
         secondary: None,

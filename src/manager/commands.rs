@@ -119,14 +119,31 @@ impl GimbalManager {
             self.do_gimbal_manager_configure(now, sender, command, around)?;
             return Ok(Outcome::Accepted);
         }
-        self.gate(now, sender, around)?;
+        let voice = self.gate(now, sender, around)?;
         match command.number {
             command::DO_GIMBAL_MANAGER_PITCHYAW => self.handle_demand(now, sender, &command.pitchyaw()?, around)?,
+            command::DO_MOUNT_CONFIGURE => self.do_mount_configure(now, sender, command, around)?,
+            command::DO_MOUNT_CONTROL => self.do_mount_control(now, sender, command, around)?,
+            // Places are the primary's, or nobody's.
+            _ => {
+                voice.needs_whole()?;
+                return self.handle_roi_command(now, sender, command, around);
+            }
+        }
+        Ok(Outcome::Accepted)
+    }
+
+    fn handle_roi_command(
+        &mut self,
+        now: Timestamp,
+        sender: MavId,
+        command: &Command,
+        around: Surroundings<'_>,
+    ) -> Result<Outcome, Refusal> {
+        match command.number {
             command::DO_SET_ROI_LOCATION => self.do_set_roi_location(now, sender, command, around)?,
             command::DO_SET_ROI_NONE => self.do_set_roi_none(now, sender)?,
-            command::DO_SET_ROI => return self.do_set_roi(now, sender, command, around),
-            command::DO_MOUNT_CONFIGURE => self.do_mount_configure(now, sender, command, around)?,
-            _ => self.do_mount_control(now, sender, command, around)?,
+            _ => return self.do_set_roi(now, sender, command, around),
         }
         Ok(Outcome::Accepted)
     }

@@ -55,6 +55,25 @@ pub enum Place {
     Secondary,
 }
 
+/// What somebody who passed the gate may demand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Voice {
+    /// Anything.
+    Whole,
+    /// Rates on top of what the primary demands; anything, if it is `whole` because the primary is silent.
+    Second { whole: bool },
+}
+
+impl Voice {
+    /// Fails where more is demanded than the voice allows.
+    pub fn needs_whole(self) -> Result<(), Refusal> {
+        match self {
+            Self::Whole | Self::Second { whole: true } => Ok(()),
+            Self::Second { whole: false } => Err(Refusal::denied("primary_is_active")),
+        }
+    }
+}
+
 /// A place that changed hands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Change {
@@ -149,20 +168,15 @@ impl Control {
         Ok(changes.into_iter().flatten().collect())
     }
 
-    /// Whether `sender` may make a demand on the gimbal. `primary_silent` tells that the primary has made none lately.
-    pub fn gate(&self, sender: MavId, primary_silent: bool, policy: Policy<'_>) -> Result<(), Refusal> {
+    /// What `sender` has to say about where the gimbal looks. `primary_silent` tells that the primary has said nothing
+    /// lately.
+    pub fn gate(&self, sender: MavId, primary_silent: bool, policy: Policy<'_>) -> Result<Voice, Refusal> {
         match (self.primary(), self.secondary()) {
-            (Some(primary), _) if primary == sender => Ok(()),
-            (Some(_), Some(secondary)) if secondary == sender => {
-                if primary_silent {
-                    Ok(())
-                } else {
-                    Err(Refusal::denied("primary_is_active"))
-                }
-            }
+            (Some(primary), _) if primary == sender => Ok(Voice::Whole),
+            (Some(_), Some(secondary)) if secondary == sender => Ok(Voice::Second { whole: primary_silent }),
             (Some(_), _) => Err(Refusal::denied("not_in_control")),
-            (None, Some(secondary)) if secondary == sender => Ok(()),
-            (None, _) if policy.open_when_unclaimed => Ok(()),
+            (None, Some(secondary)) if secondary == sender => Ok(Voice::Whole),
+            (None, _) if policy.open_when_unclaimed => Ok(Voice::Whole),
             (None, _) => Err(Refusal::denied("nobody_in_control")),
         }
     }

@@ -105,6 +105,7 @@ impl GimbalManager {
                 self.handle_demand(now, sender, &demand, around)
             }
             Mode::Place => {
+                self.gate(now, sender, around)?.needs_whole()?;
                 command.check_integers()?;
                 self.look_at(now, sender, coordinates(command)?, command.finite(4)?, Datum::Home, around)
             }

@@ -3,6 +3,7 @@
 //! Nothing is sent before the first demand, no change of frame moves the camera, and every rate ends by itself.
 
 mod motion;
+mod nudge;
 mod reading;
 mod roi;
 mod situation;
@@ -19,6 +20,7 @@ use crate::wire::MavId;
 use crate::wire::ids::CapFlags;
 pub use motion::SETTLE;
 use motion::{Motion, Point, Turn, clamp_yaw, is_zero, way};
+use nudge::Nudge;
 use roi::Roi;
 use situation::Pose;
 pub use situation::Situation;
@@ -45,8 +47,10 @@ pub struct Tracking {
     /// The aim was carried on up to here.
     carried_to: Timestamp,
     last: Option<Setpoint>,
-    /// A rate has ended because it was not refreshed, and nobody has asked yet.
-    timed_out: bool,
+    /// Whose rate has ended because it was not refreshed, until somebody asks.
+    timed_out: Option<MavId>,
+    /// What the holder of secondary control adds.
+    nudge: Nudge,
     last_at: Timestamp,
     /// What the aim takes is not known at present, so the last setpoint is held.
     stale: bool,
@@ -74,7 +78,8 @@ impl Tracking {
             next: None,
             carried_to: Timestamp::ZERO,
             last: None,
-            timed_out: false,
+            timed_out: None,
+            nudge: Nudge::default(),
             last_at: Timestamp::ZERO,
             stale: false,
             let_go: None,
@@ -100,6 +105,8 @@ impl Tracking {
             self.let_go = Some(now);
         }
         self.begin(now, source, aim);
+        let whole = matches!(aim, Aim::Retract | Aim::Neutral);
+        self.nudge.handle_absolute(now, whole || demand.pitch.angle.is_some(), whole || demand.yaw.angle.is_some());
         Ok(())
     }
 
@@ -119,6 +126,7 @@ impl Tracking {
             return Err(Refusal::later("radio_control_has_it"));
         }
         self.begin(now, source, Aim::Roi(Roi::new(place)));
+        self.nudge.handle_absolute(now, true, true);
         Ok(())
     }
 
@@ -127,13 +135,19 @@ impl Tracking {
         let was_active = matches!(self.aim, Aim::Roi(_));
         if was_active {
             self.begin(now, source, neutral(capabilities));
+            self.nudge.handle_absolute(now, true, true);
         }
         was_active
     }
 
     /// Stops every rotation, keeping the angles; true when there was one.
     pub fn stop_rates(&mut self, now: Timestamp) -> bool {
-        match &mut self.aim {
+        let nudged = self.nudge.moves();
+        if nudged {
+            self.nudge.stop();
+            self.next = Some(now);
+        }
+        let stopped = match &mut self.aim {
             Aim::Turn(turn) if !is_zero(&turn.turning) => {
                 turn.stop(now);
                 self.next = Some(now);
@@ -153,7 +167,8 @@ impl Tracking {
                 stopped
             }
             _ => false,
-        }
+        };
+        stopped || nudged
     }
 
     /// Whether the gimbal is told to turn on and on.
@@ -175,6 +190,7 @@ impl Tracking {
         self.last = None;
         self.stale = false;
         self.let_go = None;
+        self.nudge = Nudge::default();
     }
 
     /// The vehicle has turned: where the setpoint follows it, the next one is due unless one has just been sent.
@@ -204,7 +220,8 @@ impl Tracking {
             }
             return None;
         }
-        let wanted = self.setpoint(situation).and_then(|wanted| self.for_device(wanted, situation));
+        let wanted = self.setpoint(situation).map(|wanted| self.nudge.added_to(wanted, situation));
+        let wanted = wanted.and_then(|wanted| self.for_device(wanted, situation));
         self.note_stale(wanted.is_none() || self.has_lost_the_vehicle(situation));
         self.last = wanted.or(self.last);
         self.last_at = now;
@@ -227,13 +244,13 @@ impl Tracking {
         {
             turn.stop(now);
             self.next = Some(now);
-            self.timed_out = true;
+            self.timed_out = self.source;
         }
     }
 
-    /// Whether a rate has ended because it was not refreshed; true once.
-    pub fn take_timed_out(&mut self) -> bool {
-        std::mem::take(&mut self.timed_out)
+    /// Whose rate has ended because it was not refreshed; told once.
+    pub fn take_timed_out(&mut self) -> Option<MavId> {
+        self.timed_out.take()
     }
 
     /// Whether the setpoint is one of the past, because position or heading of the vehicle are not known any more.
@@ -286,21 +303,30 @@ impl Tracking {
         self.source = Some(source);
         self.carried_to = now;
         self.next = Some(now);
+        if matches!(aim, Aim::Turn(_)) {
+            self.nudge.stay();
+        }
     }
 
     /// Brings the aim up to `now`: axes that are on their way move, rates that have run out end.
     fn carry_on(&mut self, now: Timestamp, situation: &Situation<'_>) {
         let passed = now.since(self.carried_to);
+        let nudged_by = self.nudge.by();
+        if self.nudge.carry_on(self.carried_to, now) {
+            self.timed_out = nudged_by;
+        }
+        let nudge = self.nudge;
+        let unnudged = |frame| situation.measured_pose(frame).map(|pose| nudge.taken_off(pose));
         self.carried_to = now;
         match &mut self.aim {
             Aim::Turn(turn) => {
                 if turn.settles_at.is_some_and(|at| at <= now)
-                    && let Some(pose) = situation.measured_pose(turn.turning.yaw_frame)
+                    && let Some(pose) = unnudged(turn.turning.yaw_frame)
                 {
                     let turning = turn.turning;
                     self.aim = Aim::Point(Point::still(pose, turning.yaw_frame, turning.stabilised));
                 } else if situation.device_frame(turn.turning.yaw_frame) != turn.turning.yaw_frame
-                    && let Some(pose) = situation.measured_pose(turn.turning.yaw_frame)
+                    && let Some(pose) = unnudged(turn.turning.yaw_frame)
                 {
                     // The device has ceased to take this frame: we turn its angles.
                     self.aim = Aim::Point(turn.in_angles(pose));
@@ -316,7 +342,9 @@ impl Tracking {
                     point.pitch.carry_on(now, passed, straight, |angle| limits.clamp_pitch(angle)),
                     point.yaw.carry_on(now, passed, way, |angle| clamp_yaw(angle, frame, situation)),
                 ];
-                self.timed_out |= timed_out.contains(&true);
+                if timed_out.contains(&true) {
+                    self.timed_out = self.source;
+                }
             }
             Aim::Roi(roi) => roi.look_from(situation.position),
             Aim::Idle | Aim::Retract | Aim::Neutral => {}

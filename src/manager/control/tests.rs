@@ -142,14 +142,22 @@ fn the_px4_quirk_makes_minus_two_a_release_once() {
 #[test]
 #[rustfmt::skip]
 fn the_gate_opens_to_who_is_in_control() {
-    for (primary,    sender,    open,  expected) in [
-        (None,       GCS,       true,  Ok(())),
-        (None,       GCS,       false, Err(Refusal::denied("nobody_in_control"))),
-        (Some(GCS),  GCS,       false, Ok(())),
-        (Some(GCS),  COMPANION, true,  Err(Refusal::denied("not_in_control"))),
+    let denied = |reason| Err(Refusal::denied(reason));
+    let (whole, second) = (Ok(Voice::Whole), |whole| Ok(Voice::Second { whole }));
+    for (primary,      secondary,       sender,    silent, open,  expected) in [
+        (None,         None,            GCS,       true,   true,  whole),
+        (None,         None,            GCS,       true,   false, denied("nobody_in_control")),
+        (Some(GCS),    None,            GCS,       false,  false, whole),
+        (Some(GCS),    Some(COMPANION), AUTOPILOT, true,   true,  denied("not_in_control")),
+        (Some(GCS),    Some(COMPANION), COMPANION, false,  true,  second(false)),
+        (Some(GCS),    Some(COMPANION), COMPANION, true,   true,  second(true)),
+        (Some(GCS),    Some(GCS),       GCS,       false,  true,  whole),
+        (None,         Some(COMPANION), COMPANION, true,   false, whole),
     ] {
-        let court = Court { open, ..Court::held_by(primary) };
-        assert_eq!(court.control.gate(sender, false, court.policy()), expected);
+        let mut court = Court { open, ..Court::held_by(primary) };
+        let holder = |id| Holder { id, since: Timestamp::ZERO, heard: Timestamp::ZERO };
+        court.control.secondary = secondary.map(holder);
+        assert_eq!(court.control.gate(sender, silent, court.policy()), expected, "{primary:?} {secondary:?} {sender}");
     }
 }
 

@@ -5,7 +5,7 @@
 //! while nobody touches the stick, and a last one often arrives behind the command that was meant to follow it.
 
 use super::motion::{Axis, Motion, Point, Turn, clamp_yaw, is_zero};
-use super::situation::Situation;
+use super::situation::{Pose, Situation};
 use super::{Aim, RateTimeouts, Tracking, neutral};
 use crate::geometry::{Angle, AngularRate, Yaw, YawFrame};
 use crate::gimbals::adapt;
@@ -108,7 +108,7 @@ impl Tracking {
             }
             None => None,
         };
-        let measured = situation.measured_pose(hold);
+        let measured = self.unnudged_pose(hold, situation);
         // A ramp begins where the gimbal is, unless the axis is on its way already: then it goes on from there.
         let begin = |reference: Option<Axis>, measured: Option<Angle>| match (reference, measured) {
             (Some(Axis { at, motion: Motion::Slew { .. } | Motion::Turning { .. } }), _) => Ok(at),
@@ -176,18 +176,17 @@ impl Tracking {
             return Some(Point { yaw: Axis::still(yaw.angle()), frame, ..point });
         }
         if let (Aim::Roi(_), Some(Setpoint::Point(last))) = (&self.aim, self.last) {
-            let yaw = last.yaw.in_frame(frame, situation.heading)?;
-            return Some(Point {
-                roll: Axis::still(last.roll),
-                pitch: Axis::still(last.pitch),
-                yaw: Axis::still(yaw.angle()),
-                frame,
-                stabilised,
-                radio_control: RadioControl::Off,
-            });
+            let yaw = last.yaw.in_frame(frame, situation.heading)?.angle();
+            let pose = self.nudge.taken_off(Pose { roll: last.roll, pitch: last.pitch, yaw });
+            return Some(Point::still(pose, frame, stabilised));
         }
-        let pose = situation.measured_pose(frame)?;
+        let pose = self.unnudged_pose(frame, situation)?;
         Some(Point::still(pose, frame, stabilised))
+    }
+
+    /// Where the gimbal would look now if nobody nudged it, yaw in `frame`.
+    fn unnudged_pose(&self, frame: YawFrame, situation: &Situation<'_>) -> Option<Pose> {
+        situation.measured_pose(frame).map(|pose| self.nudge.taken_off(pose))
     }
 }
 

@@ -65,8 +65,18 @@ const GIMBAL: &[&str] = &[
     "rejected",
 ];
 const ATTITUDE: &[&str] = &["roll_deg", "pitch_deg", "yaw_vehicle_deg", "yaw_earth_deg", "age_ms"];
-const SETPOINT: &[&str] =
-    &["mode", "pitch_deg", "yaw_deg", "yaw_frame", "pitch_rate_dps", "yaw_rate_dps", "source", "stale"];
+const SETPOINT: &[&str] = &[
+    "mode",
+    "pitch_deg",
+    "yaw_deg",
+    "yaw_frame",
+    "pitch_rate_dps",
+    "yaw_rate_dps",
+    "source",
+    "stale",
+    "nudge_pitch_deg",
+    "nudge_yaw_deg",
+];
 
 #[track_caller]
 fn assert_has(value: &Value, fields: &[&str]) {
