@@ -29,22 +29,21 @@ mod transactions;
 pub use crate::channel::{ChannelId, ChannelSet};
 use crate::gimbals::DriverOutput;
 use crate::manager::rank::Ranks;
-use crate::manager::{ManagerOutput, Surroundings, messages};
+use crate::manager::{ManagerOutput, Surroundings};
 use crate::router::Router;
 use crate::timers::TimerTable;
 use crate::timestamp::Timestamp;
 use crate::vehicle::Vehicle;
 use crate::wire::dialect::MavMessage;
-use crate::wire::ids::{component, mav_state, mav_type};
 use crate::wire::{DatagramFrames, FrameBuffer, MavId, StreamDecoder};
 use announcements::Announcements;
 use channels::Channels;
-use conflicts::{Conflict, Conflicts};
+use conflicts::Conflicts;
 use events::Events;
-use identity::Identity;
+use identity::{Identity, Ties};
 use outbox::Outbox;
 use roster::{GimbalOutput, Roster};
-use settings::{FALLBACK_SYSTEM_ID, Role, Settings};
+use settings::{Role, Settings};
 use stations::Stations;
 use streams::AutopilotStreams;
 use transactions::{Asker, Order, Transactions};
@@ -322,11 +321,20 @@ impl Bridge {
     /// Takes the system id that the heartbeats of autopilots amount to.
     fn settle_identity(&mut self, now: Timestamp) {
         let before = self.identity.system();
-        let held = self.roster.iter().any(|gimbal| gimbal.manager.is_held());
-        if !self.identity.update(now, held) {
+        let ties = Ties {
+            is_held: self.roster.iter().any(|gimbal| gimbal.manager.is_held()),
+            fallback_is_taken: self.is_fallback_taken(now),
+        };
+        let was_bootstrap = self.identity.is_bootstrap();
+        let is_changed = self.identity.update(now, ties);
+        let system = self.identity.system();
+        if !is_changed {
+            // The fallback id turned out to be right.
+            if let Some(system) = system.filter(|_| was_bootstrap && !self.identity.is_bootstrap()) {
+                self.outbox.push_system_id(system);
+            }
             return;
         }
-        let system = self.identity.system();
         tracing::info!(system_id = system, fallback = self.identity.is_bootstrap(), "system id");
         self.router.set_own_system(system);
         self.channels.forget_held();
@@ -364,53 +372,11 @@ impl Bridge {
         self.streams.handle_autopilot_found(now);
     }
 
-    fn handle_heartbeat_timer(&mut self, now: Timestamp) {
-        let due = now + heartbeat::INTERVAL;
-        self.timers.set(Timer::Heartbeat, due);
-        if self.identity.system().is_none() {
-            self.beat_on_bootstrap_links(now);
-            return;
-        }
-        self.beat(now, self.channels.open_set());
-        self.handle_vehicle(now);
-        if self.identity.autopilots(now).count() > 1 && self.settings.system_id == settings::SystemId::Auto {
-            self.conflicts.note(now, Conflict::SeveralAutopilots);
-        }
-        self.look_for_renamed(now);
-        self.look_after_streams(now);
-        for at in 0..self.roster.len() {
-            self.announce_state(now, at);
-        }
-    }
-
-    /// A heartbeat of each manager on `channels`.
-    fn beat(&mut self, now: Timestamp, channels: ChannelSet) {
-        let bootstrap = self.identity.is_bootstrap();
-        for at in 0..self.roster.len() {
-            let gimbal = self.roster.get_mut(at);
-            if gimbal.beats() {
-                let (component, message) = (gimbal.component, heartbeat::heartbeat(gimbal, bootstrap));
-                self.send(now, channels, component, &message);
-            }
-        }
-    }
-
     /// The managers are shown what is known of the vehicle, also when nothing new was heard of it.
     fn handle_vehicle(&mut self, now: Timestamp) {
         let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
         for gimbal in self.roster.iter_mut() {
             gimbal.manager.handle_vehicle(now, around);
-        }
-    }
-
-    /// An autopilot that listens must hear somebody before it speaks; it is told the fallback id.
-    fn beat_on_bootstrap_links(&mut self, now: Timestamp) {
-        let speaks_first =
-            |channel: &ChannelId| self.channels.link_of(*channel).is_some_and(|(_, link)| link.settings.speaks_first);
-        let channels: Vec<ChannelId> = self.channels.with_role(Role::Autopilot).filter(speaks_first).collect();
-        let message = messages::heartbeat(mav_type::ONBOARD_CONTROLLER, mav_state::BOOT);
-        for channel in channels {
-            self.send_as(now, FALLBACK_SYSTEM_ID, channel.into(), component::ONBOARD_COMPUTER, &message);
         }
     }
 

@@ -424,6 +424,15 @@ impl GimbalManager {
         self.status.is_some_and(|(_, status)| status.failures.intersects(FailureFlags::HARD))
     }
 
+    /// 281 for a device on `channel` that misses its manager (`GIMBAL_DEVICE_ERROR_FLAGS_NO_MANAGER`), where somebody has
+    /// switched it off or made it rare; due once a second.
+    pub fn reminder(&self, now: Timestamp, channel: ChannelId) -> Option<Box<MavMessage>> {
+        const OFTEN_ENOUGH: Duration = Duration::from_secs(1);
+        let is_missed = self.status.is_some_and(|(_, status)| status.failures.contains(FailureFlags::NO_MANAGER));
+        let is_told = matches!(self.status_schedule.interval(channel), Interval::Every(every) if every <= OFTEN_ENOUGH);
+        if is_missed && !is_told { self.status_message(now) } else { None }
+    }
+
     /// The flags for 281: those of the setpoint, with the device's own state bits; the device's while there is none.
     pub fn flags(&self) -> GimbalFlags {
         let of_device = GimbalFlags::ACCEPTS_YAW_IN_EARTH_FRAME | GimbalFlags::RC_EXCLUSIVE | GimbalFlags::RC_MIXED;

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::LinkIndex;
+use super::settings::FALLBACK_SYSTEM_ID;
 use crate::timestamp::Timestamp;
 use crate::vehicle::Autopilot;
 use crate::wire::MavId;
@@ -26,6 +27,8 @@ pub enum Conflict {
     OwnIdInUse { id: MavId },
     /// More than one autopilot on autopilot links while the system id is to be found out.
     SeveralAutopilots,
+    /// Without an autopilot we would use an id that another vehicle has; `waits` tells that we don't yet.
+    FallbackTaken { waits: bool },
     /// A component on another channel has the id of a gimbal of ours.
     DeviceElsewhere { device: MavId, managed_on: LinkIndex, other_on: LinkIndex },
     /// The gimbal of an entry was heard on another link than the entry names.
@@ -66,6 +69,7 @@ impl Conflict {
             (Self::DeviceElsewhere { device, .. }, Self::DeviceElsewhere { device: other, .. }) => device == other,
             (Self::StationTwice { station, .. }, Self::StationTwice { station: other, .. }) => station == other,
             (Self::ForeignSystem { device, .. }, Self::ForeignSystem { device: other, .. }) => device == other,
+            (Self::FallbackTaken { .. }, Self::FallbackTaken { .. }) => true,
             _ => self == other,
         }
     }
@@ -98,6 +102,11 @@ impl Conflict {
             Self::SeveralAutopilots => "several autopilots were heard on autopilot links. Set [vehicle] system_id to \
                                         the one this gimbal belongs to."
                 .to_owned(),
+            Self::FallbackTaken { waits } => format!(
+                "no autopilot was heard on its link, and another vehicle has system id {FALLBACK_SYSTEM_ID}, which {}. \
+                 Connect the autopilot, or set [vehicle] system_id.",
+                if *waits { "we would use without one" } else { "we use without one" }
+            ),
             Self::DeviceElsewhere { device, managed_on, other_on } => format!(
                 "{device} is heard in two places; the gimbal is the one on link {}, and what comes on link {} is not \
                  believed. If there are two gimbals, give one of them another component id; if not, something sends \
@@ -193,6 +202,13 @@ impl Conflicts {
             tracing::warn!(conflict = conflict.describe(&self.links), "conflict");
             self.noticed.push((conflict, now));
         }
+    }
+
+    /// A gimbal with that component id has taken the vehicle's system id.
+    pub fn end_foreign_system(&mut self, component: u8) {
+        let is_over =
+            |known: &Conflict| matches!(known, Conflict::ForeignSystem { device, .. } if device.component == component);
+        self.noticed.retain(|(known, _)| !is_over(known));
     }
 
     /// Those noticed within the last half minute, for the person looking.

@@ -238,7 +238,7 @@ impl Bridge {
     }
 
     /// Whether an autopilot of that system was heard lately.
-    fn is_vehicle(&self, now: Timestamp, system: u8) -> bool {
+    pub(super) fn is_vehicle(&self, now: Timestamp, system: u8) -> bool {
         self.vehicles[usize::from(system)].is_some_and(|known| now.since(known.heard) < VEHICLE_GONE)
     }
 

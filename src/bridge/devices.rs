@@ -6,7 +6,7 @@
 use super::Bridge;
 use super::conflicts::Conflict;
 use super::roster::{Hearing, NotAdopted, Place, Renamed};
-use super::settings::Role;
+use super::settings::{FALLBACK_SYSTEM_ID, Role};
 use crate::timestamp::Timestamp;
 use crate::wire::dialect::{GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA, HEARTBEAT_DATA};
 use crate::wire::ids::{mav_type, message};
@@ -90,7 +90,12 @@ impl Bridge {
             self.conflicts.note(now, Conflict::ForeignSystem { device: source, system, is_managed: true });
         }
         match self.roster.adopt(now, source, place, system) {
-            Ok(gimbal) => gimbal.driver.handle_received(now, frame),
+            Ok(gimbal) => {
+                gimbal.driver.handle_received(now, frame);
+                if source.system == system {
+                    self.conflicts.end_foreign_system(source.component);
+                }
+            }
             Err(NotAdopted::Waits) => {}
             Err(NotAdopted::NoManagerLeft) => self.conflicts.note(now, Conflict::NoManagerLeft { device: source }),
         }
@@ -111,6 +116,13 @@ impl Bridge {
         let is_ours = Some(system) == self.identity.system();
         let may_be_foreign = role == Role::Ground && self.identity.is_bootstrap() && self.has_autopilot_link();
         role == Role::Gimbal || is_ours && !may_be_foreign
+    }
+
+    /// Whether another vehicle has the id that we use without an autopilot.
+    pub(super) fn is_fallback_taken(&self, now: Timestamp) -> bool {
+        let known = self.vehicles[usize::from(FALLBACK_SYSTEM_ID)];
+        let is_another = known.is_some_and(|known| known.is_on_ground_only) && self.has_autopilot_link();
+        is_another && self.is_vehicle(now, FALLBACK_SYSTEM_ID)
     }
 
     fn has_autopilot_link(&self) -> bool {

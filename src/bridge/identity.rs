@@ -17,10 +17,25 @@ pub const PATIENCE: Duration = Duration::from_secs(10);
 /// An autopilot not heard for so long is gone.
 const AUTOPILOT_LOST: Duration = Duration::from_secs(5);
 
+/// While a client is in control, the autopilot that gave us our id must be gone for so long before another's is taken:
+/// it was restarted under another one, and nobody will see the vehicle under the former any more.
+const GONE_FOR_GOOD: Duration = Duration::from_secs(30);
+
+/// What stands against another system id.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Ties {
+    /// A client is in control, and nothing may change under it.
+    pub is_held: bool,
+    /// Another vehicle has the fallback id.
+    pub fallback_is_taken: bool,
+}
+
 /// Decides the system id from the heartbeats of autopilots.
 #[derive(Debug)]
 pub struct Identity {
     started: Timestamp,
+    /// Nobody was heard in time, and the fallback id is another vehicle's.
+    is_waiting: bool,
     fixed: bool,
     system: Option<u8>,
     /// The id is the fallback, used because nobody was heard.
@@ -35,7 +50,7 @@ impl Identity {
             SystemId::Fixed(system) => (true, Some(system)),
             SystemId::Auto => (false, stored.filter(|system| *system != 0)),
         };
-        Self { started: now, fixed, system, bootstrap: false, autopilots: Vec::new() }
+        Self { started: now, is_waiting: false, fixed, system, bootstrap: false, autopilots: Vec::new() }
     }
 
     /// Our system id, `None` until it is settled.
@@ -53,9 +68,26 @@ impl Identity {
         self.bootstrap
     }
 
-    /// The autopilot systems heard lately: more than one is a conflict under `system_id = "auto"`.
-    pub fn autopilots(&self, now: Timestamp) -> impl Iterator<Item = u8> + '_ {
+    /// Whether more than one autopilot speaks, which is a conflict under `system_id = "auto"`. One that was restarted
+    /// under another id is not two.
+    pub fn has_several(&self, now: Timestamp) -> bool {
+        let alive = || self.autopilots.iter().filter(|(_, _, latest)| now.since(*latest) < AUTOPILOT_LOST);
+        alive().any(|(id, first, latest)| {
+            alive()
+                .any(|(other, other_first, other_latest)| id != other && latest > other_first && other_latest > first)
+        })
+    }
+
+    /// The autopilot systems heard lately.
+    fn alive(&self, now: Timestamp) -> impl Iterator<Item = u8> + '_ {
         self.autopilots.iter().filter(move |(_, _, latest)| now.since(*latest) < AUTOPILOT_LOST).map(|(id, ..)| *id)
+    }
+
+    /// Whether the autopilot that gave us our id does not come back.
+    fn is_orphaned(&self, now: Timestamp) -> bool {
+        let heard =
+            |ours| self.autopilots.iter().find(|(id, ..)| *id == ours).map_or(self.started, |(.., latest)| *latest);
+        !self.bootstrap && self.system.is_some_and(|ours| now.since(heard(ours)) >= GONE_FOR_GOOD)
     }
 
     /// An autopilot of `system` beat on an autopilot link.
@@ -88,26 +120,35 @@ impl Identity {
         }
         let window = self.autopilots.iter().map(|(_, first, _)| *first + WINDOW);
         match self.system {
-            None => window.chain([self.started + PATIENCE]).min(),
+            None => window.chain((!self.is_waiting).then_some(self.started + PATIENCE)).min(),
             Some(_) => None,
         }
     }
 
-    /// Settles or changes the id if it is time; true when it did. `held` tells that a client is in control, when
-    /// nothing may change under it.
-    pub fn update(&mut self, now: Timestamp, held: bool) -> bool {
+    /// Whether there is no id yet because the fallback is another vehicle's.
+    pub fn is_waiting(&self) -> bool {
+        self.is_waiting && self.system.is_none()
+    }
+
+    /// Settles or changes the id if it is time; true when it did.
+    pub fn update(&mut self, now: Timestamp, ties: Ties) -> bool {
         if self.fixed {
             return false;
         }
         let before = self.system;
-        let alive: Vec<u8> = self.autopilots(now).collect();
+        let alive: Vec<u8> = self.alive(now).collect();
         let only = if let [system] = alive[..] { Some(system) } else { None };
         let watched =
             self.autopilots.iter().map(|(_, first, _)| *first).min().is_some_and(|at| now.since(at) >= WINDOW);
         match self.system {
             None if watched && !alive.is_empty() => self.settle(only.unwrap_or(FALLBACK_SYSTEM_ID), false),
-            None if now.since(self.started) >= PATIENCE => self.settle(FALLBACK_SYSTEM_ID, true),
-            Some(ours) if !held => {
+            None if now.since(self.started) >= PATIENCE => {
+                self.is_waiting = ties.fallback_is_taken;
+                if !self.is_waiting {
+                    self.settle(FALLBACK_SYSTEM_ID, true);
+                }
+            }
+            Some(ours) if !ties.is_held || self.is_orphaned(now) => {
                 // Another id only when its autopilot alone has been heard for the whole window.
                 let other = self.autopilots.iter().find(|(id, first, latest)| {
                     Some(*id) == only && now.since(*first) >= WINDOW && now.since(*latest) < AUTOPILOT_LOST
@@ -133,17 +174,20 @@ impl Identity {
 mod tests {
     use super::*;
 
+    const FREE: Ties = Ties { is_held: false, fallback_is_taken: false };
+    const HELD: Ties = Ties { is_held: true, ..FREE };
+
     /// Protocol checklist 15: "exactly one autopilot system (say 7) beats for 3 s": its id is ours.
     #[test]
     fn the_only_autopilot_gives_its_id_after_the_window() {
         let mut identity = auto();
         for second in 1..=3 {
             identity.handle_autopilot(secs(second), 7);
-            assert!(!identity.update(secs(second), false));
+            assert!(!identity.update(secs(second), FREE));
         }
         identity.handle_autopilot(secs(4), 7);
         assert_eq!(identity.poll_timeout(), Some(secs(4)));
-        assert!(identity.update(secs(4), false));
+        assert!(identity.update(secs(4), FREE));
         assert_eq!((identity.system(), identity.is_bootstrap()), (Some(7), false));
     }
 
@@ -153,7 +197,7 @@ mod tests {
         let mut identity = auto();
         identity.handle_autopilot(secs(1), 7);
         identity.handle_autopilot(secs(2), 8);
-        assert!(identity.update(secs(4), false));
+        assert!(identity.update(secs(4), FREE));
         assert_eq!(identity.system(), Some(FALLBACK_SYSTEM_ID));
     }
 
@@ -161,15 +205,46 @@ mod tests {
     #[test]
     fn the_fallback_gives_way_to_a_late_autopilot_unless_somebody_steers() {
         let mut identity = auto();
-        assert!(!identity.update(Timestamp::from_millis(9_999), false));
-        assert!(identity.update(secs(10), false));
+        assert!(!identity.update(Timestamp::from_millis(9_999), FREE));
+        assert!(identity.update(secs(10), FREE));
         assert_eq!((identity.system(), identity.is_bootstrap()), (Some(1), true));
         for second in 20..=23 {
             identity.handle_autopilot(secs(second), 7);
         }
-        assert!(!identity.update(secs(23), true));
-        assert!(identity.update(secs(23), false));
+        assert!(!identity.update(secs(23), HELD));
+        assert!(identity.update(secs(23), FREE));
         assert_eq!((identity.system(), identity.is_bootstrap()), (Some(7), false));
+    }
+
+    /// Protocol notes 4.4: "An autopilot that changes its id (reboot with a new parameter) → re-latch", also under a client
+    /// that is in control, who would hold the gimbal of a vehicle that is not there any more.
+    #[test]
+    fn an_autopilot_that_is_gone_for_good_does_not_bind_whoever_is_in_control() {
+        let mut identity = auto();
+        for second in 0..=5 {
+            identity.handle_autopilot(secs(second), 7);
+            identity.update(secs(second), FREE);
+        }
+        for second in 6..=34 {
+            identity.handle_autopilot(secs(second), 8);
+            assert!(!identity.update(secs(second), HELD), "after {second} s");
+            assert!(!identity.has_several(secs(second)), "it is one that was restarted");
+        }
+        identity.handle_autopilot(secs(35), 8);
+        assert!(identity.update(secs(35), HELD));
+        assert_eq!(identity.system(), Some(8));
+    }
+
+    /// An id that is another vehicle's would make us a part of it.
+    #[test]
+    fn the_fallback_is_not_taken_from_another_vehicle() {
+        let mut identity = auto();
+        let taken = Ties { fallback_is_taken: true, ..FREE };
+        assert!(!identity.update(secs(10), taken));
+        assert_eq!((identity.system(), identity.is_waiting(), identity.poll_timeout()), (None, true, None));
+        // It has gone.
+        assert!(identity.update(secs(30), FREE));
+        assert_eq!((identity.system(), identity.is_waiting()), (Some(FALLBACK_SYSTEM_ID), false));
     }
 
     /// D19: a stored id is used at once; the window only confirms it.
@@ -178,7 +253,7 @@ mod tests {
         let mut identity = Identity::new(Timestamp::ZERO, SystemId::Auto, Some(7));
         assert_eq!(identity.system(), Some(7));
         identity.handle_autopilot(secs(1), 7);
-        assert!(!identity.update(secs(4), false));
+        assert!(!identity.update(secs(4), FREE));
         assert_eq!(identity.system(), Some(7));
     }
 
@@ -186,7 +261,7 @@ mod tests {
     fn a_fixed_id_never_changes() {
         let mut identity = Identity::new(Timestamp::ZERO, SystemId::Fixed(42), Some(7));
         identity.handle_autopilot(secs(1), 7);
-        assert!(!identity.update(secs(20), false));
+        assert!(!identity.update(secs(20), FREE));
         assert_eq!((identity.system(), identity.poll_timeout()), (Some(42), None));
     }
 

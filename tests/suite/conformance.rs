@@ -8,4 +8,5 @@ mod identity;
 mod manager;
 mod mavsdk_trace;
 mod own_commands;
+mod rivals;
 mod spoken_for;

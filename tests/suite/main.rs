@@ -1,6 +1,7 @@
 //! Everything that is tested from outside the crate, as one binary.
 
 mod allocations;
+mod boot_orders;
 mod captures;
 mod configuration;
 mod conformance;

@@ -1,6 +1,8 @@
 //! What more than one test needs.
 
 pub mod daemon;
+pub mod ground_station;
+pub mod hub;
 pub mod line;
 pub mod script;
 pub mod tlog;

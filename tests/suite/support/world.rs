@@ -66,6 +66,8 @@ struct End {
 pub struct World {
     pub now: Timestamp,
     pub bridge: Bridge,
+    /// While the daemon does not run nobody is heard, and the peers go on.
+    is_running: bool,
     ends: Vec<End>,
     pub stored_system_ids: Vec<u8>,
 }
@@ -76,7 +78,8 @@ impl World {
     pub fn new(settings: Settings) -> (Self, Vec<Place>) {
         let links = settings.links.len();
         let bridge = Bridge::new(Timestamp::ZERO, settings);
-        let mut world = Self { now: Timestamp::ZERO, bridge, ends: Vec::new(), stored_system_ids: Vec::new() };
+        let mut world =
+            Self { now: Timestamp::ZERO, bridge, is_running: true, ends: Vec::new(), stored_system_ids: Vec::new() };
         let mut places = Vec::new();
         for link in 0..links {
             world.input(Input::LinkUp { link });
@@ -92,6 +95,27 @@ impl World {
         let address = format!("test:{}", channel.index());
         self.input(Input::ChannelOpened { channel, link, address: &address });
         Place(self.ends.len() - 1)
+    }
+
+    /// The daemon ends without a word, as after SIGKILL.
+    pub fn kill(&mut self) {
+        self.is_running = false;
+    }
+
+    /// The daemon starts anew, on the links and with the channels that there were.
+    pub fn start(&mut self, settings: Settings) {
+        let links = settings.links.len();
+        self.bridge = Bridge::new(self.now, settings);
+        self.is_running = true;
+        for link in 0..links {
+            self.input(Input::LinkUp { link });
+        }
+        for at in 0..self.ends.len() {
+            let End { channel, link, open, .. } = self.ends[at];
+            if open {
+                self.input(Input::ChannelOpened { channel, link, address: "test" });
+            }
+        }
     }
 
     /// Unplugs a place: its peer hears and says nothing more.
@@ -117,6 +141,11 @@ impl World {
         self.settle();
     }
 
+    /// Ends the peer at a place.
+    pub fn remove(&mut self, place: Place) {
+        self.ends[place.0].peer = None;
+    }
+
     /// Bytes from a place, as one read.
     pub fn send_bytes(&mut self, from: Place, bytes: &[u8]) {
         let channel = self.ends[from.0].channel;
@@ -134,7 +163,9 @@ impl World {
     }
 
     pub fn input(&mut self, input: Input<'_>) {
-        self.bridge.handle_input(self.now, input);
+        if self.is_running {
+            self.bridge.handle_input(self.now, input);
+        }
         self.settle();
     }
 
@@ -178,7 +209,7 @@ impl World {
 
     fn next_event(&self) -> Option<Timestamp> {
         let peers = self.ends.iter().filter_map(|end| end.peer.as_ref()?.poll_timeout());
-        peers.chain(self.bridge.poll_timeout()).min().map(|at| at.max(self.now))
+        peers.chain(self.bridge_timeout()).min().map(|at| at.max(self.now))
     }
 
     fn step_to(&mut self, at: Timestamp) {
@@ -190,10 +221,14 @@ impl World {
                 peer.handle_timeout(at);
             }
         }
-        if self.bridge.poll_timeout().is_some_and(|due| due <= at) {
+        if self.bridge_timeout().is_some_and(|due| due <= at) {
             self.bridge.handle_timeout(at);
         }
         self.settle();
+    }
+
+    fn bridge_timeout(&self) -> Option<Timestamp> {
+        self.bridge.poll_timeout().filter(|_| self.is_running)
     }
 
     /// Carries everything that is on its way, until nothing is.
@@ -203,7 +238,7 @@ impl World {
             let mut said: Vec<(ChannelId, Vec<u8>)> = Vec::new();
             for end in &mut self.ends {
                 while let Some(bytes) = end.peer.as_mut().and_then(|peer| peer.poll_output()) {
-                    if end.open {
+                    if end.open && self.is_running {
                         said.push((end.channel, bytes));
                     }
                 }
@@ -223,6 +258,9 @@ impl World {
     /// Drains the core; true when there was anything.
     fn carry_outputs(&mut self) -> bool {
         let mut any = false;
+        if !self.is_running {
+            return any;
+        }
         while let Some(output) = self.bridge.poll_output() {
             any = true;
             let (channels, bytes) = match output {
