@@ -5,6 +5,7 @@
 
 mod allowance;
 mod announcements;
+mod autopilot;
 mod channels;
 mod conflicts;
 mod delivery;
@@ -22,6 +23,7 @@ mod roster;
 mod sent;
 pub mod settings;
 pub mod snapshot;
+mod state_for_gimbals;
 mod stations;
 mod streams;
 mod transactions;
@@ -44,6 +46,7 @@ use identity::{Identity, Ties};
 use outbox::Outbox;
 use roster::{GimbalOutput, Roster};
 use settings::{Role, Settings};
+use state_for_gimbals::StateForGimbals;
 use stations::Stations;
 use streams::AutopilotStreams;
 use transactions::{Asker, Order, Transactions};
@@ -113,6 +116,7 @@ pub struct Bridge {
     ranks: Ranks,
     roster: Roster,
     streams: AutopilotStreams,
+    state_for_gimbals: StateForGimbals,
     transactions: Transactions,
     conflicts: Conflicts,
     events: Events,
@@ -154,6 +158,7 @@ impl Bridge {
             ranks: Ranks::default(),
             roster: Roster::new(&settings),
             streams: AutopilotStreams::default(),
+            state_for_gimbals: StateForGimbals::default(),
             transactions: Transactions::default(),
             events: Events::default(),
             announcements: Announcements::default(),
@@ -219,6 +224,7 @@ impl Bridge {
         }
         self.transactions.handle_timeout(now);
         self.ask_autopilot(now);
+        self.tell_gimbals_state(now);
         for at in 0..self.roster.len() {
             let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
             let gimbal = self.roster.get_mut(at);
@@ -248,6 +254,7 @@ impl Bridge {
             self.channels.poll_timeout(),
             self.streams.poll_timeout().filter(|_| self.may_ask_autopilot()),
             self.transactions.poll_timeout(),
+            self.state_for_gimbals.poll_timeout(),
         ];
         let gimbals = self.roster.iter().filter_map(|gimbal| gimbal.poll_timeout());
         let gimbals = gimbals.filter(|_| self.identity.system().is_some());
@@ -350,6 +357,7 @@ impl Bridge {
         self.autopilot_heard = None;
         self.vehicle = Vehicle::new();
         self.transactions.clear();
+        self.state_for_gimbals.stop();
         if let Some(system) = system
             && let Some(known) = self.vehicles[usize::from(system)]
             && (!known.is_on_ground_only || self.is_believed(Role::Ground, system))
@@ -368,6 +376,9 @@ impl Bridge {
 
     fn take_autopilot(&mut self, now: Timestamp, autopilot: MavId) {
         tracing::info!(%autopilot, "autopilot found");
+        if self.autopilot != Some(autopilot) {
+            self.state_for_gimbals.stop();
+        }
         self.autopilot = Some(autopilot);
         self.streams.handle_autopilot_found(now);
     }

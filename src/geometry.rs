@@ -6,12 +6,14 @@
 
 pub mod aim;
 pub mod angle;
+pub mod angular_velocity;
 pub mod attitude;
 pub mod limits;
 pub mod yaw;
 
 pub use aim::{Aim, Position};
 pub use angle::{Angle, AngularRate};
+pub use angular_velocity::{AngularVelocity, BodyFrame};
 pub use attitude::{AircraftAngles, Attitude, EarthFrame, GimbalAngles, QuaternionError, VehicleFrame};
 pub use limits::{AxisLimits, Limits};
 pub use yaw::{Yaw, YawFrame};

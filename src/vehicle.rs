@@ -5,33 +5,48 @@
 
 mod attitudes;
 mod autopilot;
+mod clock;
 mod dated;
+mod estimator;
 mod landed_state;
+mod state_for_gimbals;
+mod velocities;
+mod yaw_targets;
 
 use std::time::Duration;
 
-use crate::geometry::{AircraftAngles, Angle, AngularRate, Attitude, EarthFrame, Position};
+use crate::geometry::{AircraftAngles, Angle, AngularRate, AngularVelocity, Attitude, BodyFrame, EarthFrame, Position};
 use crate::timestamp::Timestamp;
 use crate::wire::Frame;
 use crate::wire::dialect::{
-    ATTITUDE_DATA, ATTITUDE_QUATERNION_DATA, AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA, EXTENDED_SYS_STATE_DATA,
-    GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, HOME_POSITION_DATA,
+    ATTITUDE_DATA, ATTITUDE_QUATERNION_DATA, ATTITUDE_TARGET_DATA, AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA,
+    EKF_STATUS_REPORT_DATA, ESTIMATOR_STATUS_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA,
+    HOME_POSITION_DATA, LOCAL_POSITION_NED_DATA, MessageData, POSITION_TARGET_GLOBAL_INT_DATA,
+    POSITION_TARGET_LOCAL_NED_DATA, SYSTEM_TIME_DATA,
 };
 use crate::wire::ids::mav_autopilot;
-use attitudes::Attitudes;
+use attitudes::{Attitudes, Orientation};
 pub use autopilot::Autopilot;
+use clock::{BootClock, Stamp};
 use dated::Dated;
 pub use landed_state::LandedState;
+use velocities::Velocities;
+use yaw_targets::YawTargets;
 
 /// The vehicle as its autopilot tells of it; who that autopilot is, is the caller's business.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Vehicle {
     last_heard: Option<Timestamp>,
     autopilot: Option<Autopilot>,
+    clock: BootClock,
     attitudes: Attitudes,
     /// `GLOBAL_POSITION_INT.hdg`.
     compass: Option<Dated<Angle>>,
     position: Option<Dated<Position>>,
+    velocities: Velocities,
+    yaw_targets: YawTargets,
+    /// `ESTIMATOR_STATUS_FLAGS`.
+    estimator_status: Option<Dated<u16>>,
     /// Of home, above mean sea level.
     home_altitude_m: Option<Dated<f64>>,
     /// The same from `HOME_POSITION`, which holds until home is set again.
@@ -46,6 +61,7 @@ const ALIVE_WITHIN: Duration = Duration::from_secs(5);
 const ATTITUDE_WITHIN: Duration = Duration::from_secs(1);
 const POSITION_WITHIN: Duration = Duration::from_secs(5);
 const LANDED_STATE_WITHIN: Duration = Duration::from_secs(5);
+const ESTIMATOR_STATUS_WITHIN: Duration = Duration::from_secs(5);
 
 impl Vehicle {
     pub fn new() -> Self {
@@ -58,18 +74,41 @@ impl Vehicle {
         if let Some(message) = frame.decode::<HEARTBEAT_DATA>() {
             self.handle_heartbeat(&message);
         } else if let Some(message) = frame.decode::<ATTITUDE_DATA>() {
-            self.handle_attitude(now, &message);
+            let late = self.handle_boot_ms(now, frame, message.time_boot_ms);
+            self.handle_attitude(now, &message, late);
         } else if let Some(message) = frame.decode::<ATTITUDE_QUATERNION_DATA>() {
-            self.handle_attitude_quaternion(now, &message);
+            let late = self.handle_boot_ms(now, frame, message.time_boot_ms);
+            self.handle_attitude_quaternion(now, &message, late);
         } else if let Some(message) = frame.decode::<GLOBAL_POSITION_INT_DATA>() {
-            self.handle_global_position_int(now, &message);
+            let late = self.handle_boot_ms(now, frame, message.time_boot_ms);
+            self.handle_global_position_int(now, &message, late);
         } else if let Some(message) = frame.decode::<AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA>() {
             self.handle_autopilot_state_for_gimbal_device(now, &message);
         } else if let Some(message) = frame.decode::<HOME_POSITION_DATA>() {
             self.home_position_altitude_m = Some(metres(message.altitude));
         } else if let Some(message) = frame.decode::<EXTENDED_SYS_STATE_DATA>() {
             self.set_landed_state(now, message.landed_state);
+        } else if let Some(message) = frame.decode::<LOCAL_POSITION_NED_DATA>() {
+            let late = self.handle_boot_ms(now, frame, message.time_boot_ms);
+            self.velocities.handle_local(now, &message, late);
+        } else if let Some(message) = frame.decode::<POSITION_TARGET_LOCAL_NED_DATA>() {
+            self.yaw_targets.handle_position_target_local_ned(now, &message);
+        } else if let Some(message) = frame.decode::<POSITION_TARGET_GLOBAL_INT_DATA>() {
+            self.yaw_targets.handle_position_target_global_int(now, &message);
+        } else if let Some(message) = frame.decode::<ATTITUDE_TARGET_DATA>() {
+            self.yaw_targets.handle_attitude_target(now, &message, self.attitude(now));
+        } else if let Some(message) = frame.decode::<ESTIMATOR_STATUS_DATA>() {
+            self.estimator_status = Some(Dated::new(now, estimator::from_estimator_status(&message)));
+        } else if let Some(message) = frame.decode::<EKF_STATUS_REPORT_DATA>() {
+            self.estimator_status = Some(Dated::new(now, estimator::from_ekf_status_report(&message)));
+        } else if let Some(message) = frame.decode::<SYSTEM_TIME_DATA>() {
+            self.handle_boot_ms(now, frame, message.time_boot_ms);
         }
+    }
+
+    /// How often the autopilot was started anew while it was listened to.
+    pub fn restarts(&self) -> u32 {
+        self.clock.restarts()
     }
 
     /// Whether the autopilot was heard within the last 5 s.
@@ -98,6 +137,14 @@ impl Vehicle {
         self.attitude(now).map(Attitude::heading).or_else(compass)
     }
 
+    /// What was known and is too old to act on: `heading`, `position`.
+    pub fn stale(&self, now: Timestamp) -> impl Iterator<Item = &'static str> {
+        let had_heading = self.compass.is_some() || self.attitudes.best(now).is_some();
+        let heading = (had_heading && self.heading(now).is_none()).then_some("heading");
+        let position = (self.position.is_some() && self.position(now).is_none()).then_some("position");
+        [heading, position].into_iter().flatten()
+    }
+
     /// Altitude above mean sea level; not older than 5 s.
     pub fn position(&self, now: Timestamp) -> Option<Position> {
         self.position.and_then(|position| position.within(now, POSITION_WITHIN))
@@ -117,8 +164,16 @@ impl Vehicle {
     }
 
     /// How fast the vehicle turns about Down, to the right; not older than 1 s.
+    ///
+    /// As 286 tells it, or else as the attitude's own rates do.
     pub fn yaw_rate(&self, now: Timestamp) -> Option<AngularRate> {
-        self.yaw_rate.and_then(|rate| rate.within(now, ATTITUDE_WITHIN))
+        let of_attitude = || Some(self.attitudes.orientation(now)?.value.turn?.about_down());
+        self.yaw_rate.and_then(|rate| rate.within(now, ATTITUDE_WITHIN)).or_else(of_attitude)
+    }
+
+    /// Which estimates the autopilot trusts (`ESTIMATOR_STATUS_FLAGS`); not older than 5 s.
+    pub fn estimator_status(&self, now: Timestamp) -> Option<u16> {
+        self.estimator_status.and_then(|status| status.within(now, ESTIMATOR_STATUS_WITHIN))
     }
 
     /// Not older than 5 s.
@@ -132,22 +187,52 @@ impl Vehicle {
         }
     }
 
-    fn handle_attitude(&mut self, now: Timestamp, message: &ATTITUDE_DATA) {
+    /// Takes the time stamp of a frame; how late the frame is. After a restart nothing moves as it did before.
+    fn handle_boot_ms(&mut self, now: Timestamp, frame: &Frame<'_>, boot_ms: u32) -> Option<Duration> {
+        let before = self.clock.restarts();
+        let late = self.clock.handle_stamp(now, frame.message_id(), Stamp::Millis(boot_ms));
+        if self.clock.restarts() != before {
+            self.attitudes = Attitudes::default();
+            self.velocities = Velocities::default();
+            self.yaw_targets = YawTargets::default();
+            self.yaw_rate = None;
+            self.estimator_status = None;
+        }
+        late
+    }
+
+    fn handle_attitude(&mut self, now: Timestamp, message: &ATTITUDE_DATA, late: Option<Duration>) {
         let [roll, pitch, yaw] =
             [message.roll, message.pitch, message.yaw].map(|radians| Angle::from_radians(f64::from(radians)));
         if roll.is_finite() && pitch.is_finite() && yaw.is_finite() {
             let attitude = Attitude::from_aircraft_angles(AircraftAngles { roll, pitch, yaw });
-            self.attitudes.from_angles = Some(Dated::new(now, attitude));
+            let turn = turn(attitude, [message.rollspeed, message.pitchspeed, message.yawspeed]);
+            self.attitudes.from_angles = Some(Dated::new(now, Orientation { attitude, turn, late }));
         }
     }
 
-    fn handle_attitude_quaternion(&mut self, now: Timestamp, message: &ATTITUDE_QUATERNION_DATA) {
-        if let Ok(Some(attitude)) = Attitude::from_wxyz([message.q1, message.q2, message.q3, message.q4]) {
-            self.attitudes.from_quaternion = Some(Dated::new(now, attitude));
-        }
+    fn handle_attitude_quaternion(
+        &mut self,
+        now: Timestamp,
+        message: &ATTITUDE_QUATERNION_DATA,
+        late: Option<Duration>,
+    ) {
+        let Ok(Some(of_body)) = Attitude::from_wxyz([message.q1, message.q2, message.q3, message.q4]) else { return };
+        let turn = turn(of_body, [message.rollspeed, message.pitchspeed, message.yawspeed]);
+        // "Rotation offset by which the attitude quaternion … should be rotated for user display", all zeros when there
+        // is none: a tail-sitter that flies like an aeroplane tells here which way is forward.
+        let offset = Attitude::<BodyFrame>::from_wxyz(message.repr_offset_q).ok().flatten();
+        self.attitudes.is_reoriented = offset.is_some_and(|offset| offset != Attitude::identity());
+        let attitude = offset.map_or(of_body, |offset| of_body.of_mounted(offset));
+        self.attitudes.from_quaternion = Some(Dated::new(now, Orientation { attitude, turn, late }));
     }
 
-    fn handle_global_position_int(&mut self, now: Timestamp, message: &GLOBAL_POSITION_INT_DATA) {
+    fn handle_global_position_int(
+        &mut self,
+        now: Timestamp,
+        message: &GLOBAL_POSITION_INT_DATA,
+        late: Option<Duration>,
+    ) {
         if message.hdg <= 36_000 {
             let heading = Angle::from_degrees(f64::from(message.hdg) / 100.0).wrapped();
             self.compass = Some(Dated::new(now, heading));
@@ -164,6 +249,7 @@ impl Vehicle {
             altitude_m: metres(message.alt),
         };
         self.position = Some(Dated::new(now, position));
+        self.velocities.handle_global(now, message, late);
         self.home_altitude_m = Some(Dated::new(now, metres(message.alt) - metres(message.relative_alt)));
     }
 
@@ -172,6 +258,7 @@ impl Vehicle {
         now: Timestamp,
         message: &AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA,
     ) {
+        self.clock.handle_stamp(now, AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA::ID, Stamp::Micros(message.time_boot_us));
         if let Ok(Some(attitude)) = Attitude::from_wxyz(message.q) {
             self.attitudes.for_gimbals = Some(Dated::new(now, attitude));
         }
@@ -188,6 +275,11 @@ impl Vehicle {
             self.landed_state = Some(Dated::new(now, state));
         }
     }
+}
+
+/// Rates about the body's axes as one turn in earth's; `None` unless all are numbers.
+fn turn(attitude: Attitude<EarthFrame>, body_rates: [f32; 3]) -> Option<AngularVelocity<EarthFrame>> {
+    AngularVelocity::from_radians_per_second(body_rates.map(f64::from)).map(|turn| attitude.turn_in_frame(turn))
 }
 
 fn metres(millimetres: i32) -> f64 {

@@ -47,6 +47,15 @@ impl Bridge {
                 }
             }
             message::COMMAND_ACK if !ours => self.handle_command_ack(now, frame),
+            // Another component of the vehicle may tell gimbals in the autopilot's stead.
+            message::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE
+                if !ours
+                    && role != Role::Ground
+                    && self.autopilot != Some(source)
+                    && Some(source.system) == self.identity.system() =>
+            {
+                self.state_for_gimbals.handle_told_by_others(now);
+            }
             _ => {}
         }
         for gimbal in self.roster.iter_mut() {
@@ -73,8 +82,7 @@ impl Bridge {
             }
             return;
         }
-        self.vehicle.handle_frame(now, frame);
-        self.streams.handle_seen(now, frame.message_id());
+        self.take_vehicle_frame(now, frame);
         self.show_vehicle(now, frame.message_id());
     }
 

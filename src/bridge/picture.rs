@@ -102,6 +102,8 @@ impl Bridge {
             altitude_amsl_m: position.map(|position| position.altitude_m),
             position_age_ms: vehicle.position_age(now).map(millis),
             yaw_rate_dps: vehicle.yaw_rate(now).map(AngularRate::degrees_per_second),
+            state_for_gimbal: self.state_for_gimbals.source(now).map(|source| source.name().to_owned()),
+            stale: vehicle.stale(now).map(str::to_owned).collect(),
         }
     }
 

@@ -95,8 +95,15 @@ pub struct VehicleSnapshot {
     pub longitude_deg: Option<f64>,
     pub altitude_amsl_m: Option<f64>,
     pub position_age_ms: Option<u64>,
-    /// Turning rate about Down as the autopilot reports it (286); 0 on the wire means that it does not know.
+    /// Turning rate about Down as the autopilot reports it: in 286, where 0 on the wire means that it does not know, or
+    /// else with its attitude.
     pub yaw_rate_dps: Option<f64>,
+    /// Who tells gimbals the vehicle's state (286): `autopilot` for any component of the vehicle, `synthesized` when we
+    /// make it from what the autopilot tells others.
+    pub state_for_gimbal: Option<String>,
+    /// What was known and is too old to act on: `heading` after a second, which conversions between North and the nose
+    /// need, and `position` after five, which ROI needs.
+    pub stale: Vec<String>,
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -1,9 +1,10 @@
-//! Messages that the autopilot does not send unasked, and that we or the gimbal need.
+//! Messages that the autopilot does not send unasked, or not often enough, and that we or the gimbal need.
 //!
 //! `SET_MESSAGE_INTERVAL` (511) for each one that is missing while the autopilot is alive, until it comes or is refused.
 
 use std::time::Duration;
 
+use super::transactions;
 use crate::gimbals::CommandOutcome;
 use crate::timestamp::Timestamp;
 use crate::wire::ids::{CommandResult, message};
@@ -14,42 +15,60 @@ const MISSING_AFTER: Duration = Duration::from_secs(2);
 /// It is asked for at most so often.
 const ASK_EVERY: Duration = Duration::from_secs(5);
 
-/// A message we want, and how often.
+/// A message that was asked for so often, copies of a request counted, does not come.
+const IGNORED_AFTER: u8 = transactions::TRIES;
+
+/// One that comes is asked for at most so often to come faster.
+const FASTER_REQUESTS: u8 = 3;
+
+/// The messages that we ask for, in the order in which we do.
+const WANTED: [u32; 9] = [
+    message::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE,
+    message::ATTITUDE_QUATERNION,
+    message::ATTITUDE,
+    message::GLOBAL_POSITION_INT,
+    message::LOCAL_POSITION_NED,
+    message::EXTENDED_SYS_STATE,
+    message::ESTIMATOR_STATUS,
+    message::EKF_STATUS_REPORT,
+    message::ATTITUDE_TARGET,
+];
+
+/// How much of a message somebody here needs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Need {
+    None,
+    /// It is asked for at this interval when it does not come at all; whoever set another has his reasons.
+    Some(Duration),
+    /// It is asked for at this interval when it comes more slowly.
+    AtLeast(Duration),
+}
+
+/// A message, and what became of asking for it.
 #[derive(Clone, Copy, Debug)]
 struct Wanted {
     message_id: u32,
-    interval: Duration,
+    need: Need,
     seen: Option<Timestamp>,
+    /// The time from one to the next, smoothed.
+    spacing: Option<Duration>,
     asked: Option<Timestamp>,
+    /// How often it was asked for since it last came.
+    tries: u8,
+    faster_requests: u8,
     refused: bool,
-    needed: bool,
 }
 
 /// What we want of the autopilot.
 #[derive(Debug)]
 pub struct AutopilotStreams {
-    wanted: [Wanted; 3],
+    wanted: [Wanted; WANTED.len()],
     since: Option<Timestamp>,
 }
 
 impl Default for AutopilotStreams {
     fn default() -> Self {
-        let wanted = |message_id, millis| Wanted {
-            message_id,
-            interval: Duration::from_millis(millis),
-            seen: None,
-            asked: None,
-            refused: false,
-            needed: false,
-        };
-        Self {
-            wanted: [
-                wanted(message::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE, 40),
-                wanted(message::ATTITUDE, 100),
-                wanted(message::GLOBAL_POSITION_INT, 200),
-            ],
-            since: None,
-        }
+        Self { wanted: WANTED.map(Wanted::new), since: None }
     }
 }
 
@@ -58,9 +77,7 @@ impl AutopilotStreams {
     pub fn handle_autopilot_found(&mut self, now: Timestamp) {
         self.since = Some(now);
         for wanted in &mut self.wanted {
-            wanted.seen = None;
-            wanted.asked = None;
-            wanted.refused = false;
+            *wanted = Wanted { need: wanted.need, ..Wanted::new(wanted.message_id) };
         }
     }
 
@@ -75,15 +92,22 @@ impl AutopilotStreams {
 
     /// The autopilot sent `message_id`.
     pub fn handle_seen(&mut self, now: Timestamp, message_id: u32) {
-        if let Some(wanted) = self.find(message_id) {
+        if let Some(wanted) = self.find_mut(message_id) {
+            let spacing = wanted.seen.map(|seen| now.since(seen));
+            wanted.spacing = match (wanted.spacing, spacing) {
+                (Some(smoothed), Some(spacing)) => Some((smoothed * 3 + spacing) / 4),
+                (_, spacing) => spacing,
+            };
             wanted.seen = Some(now);
+            wanted.tries = 0;
+            wanted.refused = false;
         }
     }
 
-    /// Whether the message is of use to anybody here.
-    pub fn set_needed(&mut self, message_id: u32, needed: bool) {
-        if let Some(wanted) = self.find(message_id) {
-            wanted.needed = needed;
+    /// How much of the message is of use to anybody here.
+    pub fn set_need(&mut self, message_id: u32, need: Need) {
+        if let Some(wanted) = self.find_mut(message_id) {
+            wanted.need = need;
         }
     }
 
@@ -91,36 +115,89 @@ impl AutopilotStreams {
     pub fn handle_outcome(&mut self, message_id: u32, outcome: CommandOutcome) {
         const REFUSALS: [u8; 3] =
             [CommandResult::Denied as u8, CommandResult::Unsupported as u8, CommandResult::Failed as u8];
-        if let Some(wanted) = self.find(message_id)
-            && matches!(outcome, CommandOutcome::Answered(result) if REFUSALS.contains(&result))
-        {
-            wanted.refused = true;
+        let Some(wanted) = self.find_mut(message_id) else { return };
+        match outcome {
+            CommandOutcome::Answered(result) => {
+                wanted.refused |= REFUSALS.contains(&result);
+                wanted.tries = wanted.tries.saturating_add(1);
+            }
+            CommandOutcome::Unanswered => wanted.tries = wanted.tries.saturating_add(transactions::TRIES),
         }
+    }
+
+    /// Whether `message_id` was asked for and will not come: "the request was refused or ignored three times".
+    pub fn will_not_come(&self, now: Timestamp, message_id: u32) -> bool {
+        let Some(wanted) = self.find(message_id) else { return false };
+        // Who accepts may need a moment to begin.
+        let waited = wanted.asked.is_none_or(|asked| now.since(asked) >= MISSING_AFTER);
+        wanted.refused || (wanted.tries >= IGNORED_AFTER && waited)
+    }
+
+    /// Whether `message_id` comes about as often as every `interval`.
+    pub fn comes_every(&self, now: Timestamp, message_id: u32, interval: Duration) -> bool {
+        self.find(message_id).is_some_and(|wanted| wanted.is_there(now) && !wanted.is_slower_than(interval))
     }
 
     pub fn poll_timeout(&self) -> Option<Timestamp> {
         let since = self.since?;
-        let due = self.wanted.iter().filter(|wanted| wanted.needed && !wanted.refused).map(|wanted| wanted.due(since));
-        due.min()
+        self.wanted.iter().filter_map(|wanted| wanted.due(since)).min()
     }
 
     /// A message to ask for at `now`, with its interval; the next one when this request is done with.
     pub fn take_due(&mut self, now: Timestamp) -> Option<(u32, Duration)> {
         let since = self.since?;
-        let wanted =
-            self.wanted.iter_mut().find(|wanted| wanted.needed && !wanted.refused && wanted.due(since) <= now)?;
+        let wanted = self.wanted.iter_mut().find(|wanted| wanted.due(since).is_some_and(|due| due <= now))?;
+        let (Need::Some(interval) | Need::AtLeast(interval)) = wanted.need else { return None };
+        if wanted.is_there(now) {
+            wanted.faster_requests += 1;
+        }
         wanted.asked = Some(now);
-        Some((wanted.message_id, wanted.interval))
+        Some((wanted.message_id, interval))
     }
 
-    fn find(&mut self, message_id: u32) -> Option<&mut Wanted> {
+    fn find(&self, message_id: u32) -> Option<&Wanted> {
+        self.wanted.iter().find(|wanted| wanted.message_id == message_id)
+    }
+
+    fn find_mut(&mut self, message_id: u32) -> Option<&mut Wanted> {
         self.wanted.iter_mut().find(|wanted| wanted.message_id == message_id)
     }
 }
 
 impl Wanted {
-    fn due(&self, since: Timestamp) -> Timestamp {
+    const fn new(message_id: u32) -> Self {
+        Self {
+            message_id,
+            need: Need::None,
+            seen: None,
+            spacing: None,
+            asked: None,
+            tries: 0,
+            faster_requests: 0,
+            refused: false,
+        }
+    }
+
+    fn due(&self, since: Timestamp) -> Option<Timestamp> {
+        if self.refused {
+            return None;
+        }
         let missing = self.seen.unwrap_or(since) + MISSING_AFTER;
-        self.asked.map_or(missing, |asked| missing.max(asked + ASK_EVERY))
+        let due = match self.need {
+            Need::None => return None,
+            // It comes, but too slowly: there is nothing to wait for.
+            Need::AtLeast(interval) if self.is_slower_than(interval) && self.faster_requests < FASTER_REQUESTS => since,
+            Need::Some(_) | Need::AtLeast(_) => missing,
+        };
+        Some(self.asked.map_or(due, |asked| due.max(asked + ASK_EVERY)))
+    }
+
+    fn is_there(&self, now: Timestamp) -> bool {
+        self.seen.is_some_and(|seen| now.since(seen) < MISSING_AFTER)
+    }
+
+    /// By half or more: an interval in whole ticks of the sender is not met exactly.
+    fn is_slower_than(&self, interval: Duration) -> bool {
+        self.spacing.is_some_and(|spacing| spacing > interval * 3 / 2)
     }
 }

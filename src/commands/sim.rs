@@ -19,7 +19,7 @@ use crate::sim::faults::{Faults, FaultyPeer};
 use crate::sim::host;
 use crate::sim::peer::Peer;
 use crate::sim::plant::PlantSettings;
-use crate::sim::vehicle::{Autopilot, Vehicle, VehicleSettings};
+use crate::sim::vehicle::{Autopilot, StateForGimbals, Vehicle, VehicleSettings};
 use crate::timestamp::Timestamp;
 use crate::wire::ids::CapFlags;
 
@@ -112,7 +112,11 @@ pub fn run_sim_vehicle(arguments: &SimVehicleArgs, errors: &mut impl Write) -> E
             SimulatedAutopilot::ArduPilot => Autopilot::ArduPilot,
         },
         system_id: arguments.system_id,
-        tells_gimbals: !arguments.no_autopilot_state,
+        state_for_gimbals: match arguments.no_autopilot_state {
+            true => StateForGimbals::Denied,
+            false => StateForGimbals::Told,
+        },
+        uptime: Duration::ZERO,
         unix_time_us: unix_time_us(),
     };
     run(Vehicle::new(Timestamp::ZERO, settings), &arguments.endpoint, errors)

@@ -39,6 +39,7 @@ const YAW_FRAMES: &[(&str, DeviceYawFrame)] =
 const SIGNS: &[(&str, Signs)] = &[("normal", Signs::Normal), ("reversed", Signs::Reversed)];
 const UNCLAIMED: &[(&str, bool)] = &[("open", true), ("closed", false)];
 const FIREWALLS: &[(&str, Firewall)] = &[("on", Firewall::On), ("warn", Firewall::Warn)];
+const SYNTHESIS: &[(&str, bool)] = &[("auto", true), ("off", false)];
 const ALTITUDES: &[(&str, AltitudeReference)] =
     &[("auto", AltitudeReference::Auto), ("amsl", AltitudeReference::Amsl), ("relative", AltitudeReference::Relative)];
 const ENDPOINT_KINDS: [&str; 6] = ["serial", "udpin", "udpout", "udpbcast", "tcpin", "tcpout"];
@@ -99,6 +100,7 @@ pub(super) struct Control {
     pub firewall: Option<Located<Firewall>>,
     pub snoop_autopilot: Option<Located<bool>>,
     pub px4_release_quirk: Option<Located<bool>>,
+    pub synthesize_286: Option<Located<bool>>,
 }
 
 #[derive(Debug, Default)]
@@ -154,6 +156,7 @@ fn control(section: &mut Section<'_>) -> Control {
         firewall: section.read("firewall", |raw| word(raw, FIREWALLS)),
         snoop_autopilot: section.read("snoop_autopilot", flag),
         px4_release_quirk: section.read("px4_release_quirk", flag),
+        synthesize_286: section.read("synthesize_286", |raw| word(raw, SYNTHESIS)),
     }
 }
 

@@ -140,8 +140,12 @@ impl<F> Attitude<F> {
         Angle::from_radians(self.rotation.angle_to(&other.rotation))
     }
 
-    fn from_rotation(rotation: UnitQuaternion<f64>) -> Self {
+    pub(super) fn from_rotation(rotation: UnitQuaternion<f64>) -> Self {
         Self { rotation, frame: PhantomData }
+    }
+
+    pub(super) fn rotation(self) -> UnitQuaternion<f64> {
+        self.rotation
     }
 
     /// What is left of yaw where the other outer axis coincides with it.

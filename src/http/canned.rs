@@ -27,6 +27,8 @@ pub fn snapshot() -> Snapshot {
             altitude_amsl_m: Some(488.5),
             position_age_ms: Some(95),
             yaw_rate_dps: Some(3.5),
+            state_for_gimbal: Some("synthesized".into()),
+            stale: Vec::new(),
         },
         gimbals: vec![held_gimbal(), searched_gimbal()],
         conflicts: vec!["1/191 is also used by 10.0.0.7: set its component id to another value".into()],

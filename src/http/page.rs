@@ -9,7 +9,7 @@ const PAGE: &str = include_str!("page.html");
 /// name that a gimbal reports became markup, it could neither run nor load anything.
 const POLICY: &str = "default-src 'none'; \
     style-src 'sha256-qktgxO7X3SOGDQ7Tmtw4zR4SqhIYleK/DYmiXfhYbQE='; \
-    script-src 'sha256-rakJM1DfhGwvjD0iC7xVNt3VgizALn3j+VAcI0W82UM='; \
+    script-src 'sha256-waQYcZJOzAPNbNF26pujrxWcwLMnmNzEpOsXBRYuz64='; \
     connect-src 'self'; img-src data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 pub async fn page() -> impl IntoResponse {

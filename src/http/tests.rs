@@ -46,7 +46,7 @@ fn status_is_the_whole_snapshot() {
             "system_id": 1, "autopilot": "ardupilot", "alive": true,
             "roll_deg": 2.5, "pitch_deg": -1.25, "heading_deg": 87.0, "attitude_age_ms": 12,
             "latitude_deg": 47.397_742, "longitude_deg": 8.545_594, "altitude_amsl_m": 488.5, "position_age_ms": 95,
-            "yaw_rate_dps": 3.5,
+            "yaw_rate_dps": 3.5, "state_for_gimbal": "synthesized", "stale": [],
         },
         "gimbals": [
             {

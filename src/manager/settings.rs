@@ -17,6 +17,8 @@ pub struct ControlSettings {
     pub snoop_autopilot: bool,
     /// A (-2, -2) pair from the autopilot that holds control is a release.
     pub px4_release_quirk: bool,
+    /// Tell gimbals the state of the vehicle (286) when its autopilot refuses to, or ignores the request.
+    pub synthesize_286: bool,
     pub roi_altitude: AltitudeReference,
 }
 
@@ -30,6 +32,7 @@ impl Default for ControlSettings {
             firewall: Firewall::On,
             snoop_autopilot: false,
             px4_release_quirk: false,
+            synthesize_286: true,
             roi_altitude: AltitudeReference::Auto,
         }
     }

@@ -18,6 +18,7 @@ use crate::sim::peer::{Peer, PlatformMotion};
 use crate::sim::streams::Streams;
 use crate::timestamp::Timestamp;
 use crate::wire::decoder::Patience;
+use crate::wire::ids::message;
 use crate::wire::{MavId, StreamDecoder};
 
 /// A frame whose rest does not come within this was noise.
@@ -30,20 +31,40 @@ pub enum Autopilot {
     ArduPilot,
 }
 
+/// What it does about `AUTOPILOT_STATE_FOR_GIMBAL_DEVICE`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StateForGimbals {
+    /// PX4 streams it and ArduPilot sends it when asked.
+    Told,
+    /// It does not know it, and says so.
+    Denied,
+    /// It does not answer a request for it.
+    Ignored,
+    /// It accepts a request for it and sends nothing, as ArduPilot does with other messages.
+    Promised,
+}
+
 /// Everything that differs from one simulated vehicle to another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VehicleSettings {
     pub autopilot: Autopilot,
     pub system_id: u8,
-    /// Whether it knows `AUTOPILOT_STATE_FOR_GIMBAL_DEVICE`, which PX4 streams and ArduPilot sends when asked.
-    pub tells_gimbals: bool,
+    pub state_for_gimbals: StateForGimbals,
+    /// What its clock reads when it is started; it reads on from zero after a reboot.
+    pub uptime: Duration,
     /// Microseconds since 1970 when `now` is zero; unknown when `None`.
     pub unix_time_us: Option<u64>,
 }
 
 impl Default for VehicleSettings {
     fn default() -> Self {
-        Self { autopilot: Autopilot::Px4, system_id: 1, tells_gimbals: true, unix_time_us: None }
+        Self {
+            autopilot: Autopilot::Px4,
+            system_id: 1,
+            state_for_gimbals: StateForGimbals::Told,
+            uptime: Duration::ZERO,
+            unix_time_us: None,
+        }
     }
 }
 
@@ -63,7 +84,7 @@ pub struct Vehicle {
 impl Vehicle {
     pub fn new(now: Timestamp, settings: VehicleSettings) -> Self {
         let mut streams = Streams::default();
-        for (id, usual) in telemetry::usual_streams(settings.autopilot, settings.tells_gimbals) {
+        for (id, usual) in telemetry::usual_streams(settings.autopilot, settings.state_for_gimbals) {
             streams.add(id, usual, now);
         }
         Self {
@@ -101,6 +122,21 @@ impl Vehicle {
 
     pub fn parameter(&self, name: &str) -> Option<ParameterValue> {
         self.parameters.value(name)
+    }
+
+    /// What its clock reads.
+    fn clock(&self, now: Timestamp) -> Timestamp {
+        Timestamp::ZERO + self.settings.uptime + now.since(self.boot)
+    }
+
+    /// Whether it answers requests for a message as if it knew it.
+    fn promises(&self, id: u32) -> bool {
+        id == message::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE && self.settings.state_for_gimbals == StateForGimbals::Promised
+    }
+
+    /// Whether it does not answer requests for a message at all.
+    fn ignores(&self, id: u32) -> bool {
+        id == message::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE && self.settings.state_for_gimbals == StateForGimbals::Ignored
     }
 
     fn read_frames(&mut self, now: Timestamp) {
@@ -146,7 +182,7 @@ impl Peer for Vehicle {
     }
 
     fn handle_reboot(&mut self, now: Timestamp) {
-        *self = Self::new(now, self.settings);
+        *self = Self::new(now, VehicleSettings { uptime: Duration::ZERO, ..self.settings });
     }
 }
 

@@ -10,6 +10,16 @@ pub enum LandedState {
 }
 
 impl LandedState {
+    /// `MAV_LANDED_STATE`.
+    pub(super) fn number(self) -> u8 {
+        match self {
+            Self::OnGround => 1,
+            Self::InAir => 2,
+            Self::TakingOff => 3,
+            Self::Landing => 4,
+        }
+    }
+
     pub(super) fn from_number(number: u8) -> Option<Self> {
         match number {
             1 => Some(Self::OnGround),

@@ -48,12 +48,16 @@ pub mod message {
     pub const PARAM_SET: u32 = 23;
     pub const ATTITUDE: u32 = 30;
     pub const ATTITUDE_QUATERNION: u32 = 31;
+    pub const LOCAL_POSITION_NED: u32 = 32;
     pub const GLOBAL_POSITION_INT: u32 = 33;
     pub const MANUAL_CONTROL: u32 = 69;
     pub const COMMAND_INT: u32 = 75;
     pub const COMMAND_LONG: u32 = 76;
     pub const COMMAND_ACK: u32 = 77;
     pub const COMMAND_CANCEL: u32 = 80;
+    pub const ATTITUDE_TARGET: u32 = 83;
+    pub const POSITION_TARGET_LOCAL_NED: u32 = 85;
+    pub const POSITION_TARGET_GLOBAL_INT: u32 = 87;
     pub const RADIO_STATUS: u32 = 109;
     pub const TIMESYNC: u32 = 111;
     pub const AUTOPILOT_VERSION: u32 = 148;
@@ -61,7 +65,10 @@ pub mod message {
     pub const MOUNT_CONTROL: u32 = 157;
     pub const MOUNT_STATUS: u32 = 158;
     pub const RADIO: u32 = 166;
+    pub const EKF_STATUS_REPORT: u32 = 193;
+    pub const ESTIMATOR_STATUS: u32 = 230;
     pub const MESSAGE_INTERVAL: u32 = 244;
+    pub const EXTENDED_SYS_STATE: u32 = 245;
     pub const STATUSTEXT: u32 = 253;
     pub const CAMERA_INFORMATION: u32 = 259;
     pub const MOUNT_ORIENTATION: u32 = 265;
@@ -212,6 +219,32 @@ pub mod mav_frame {
     pub const GLOBAL_RELATIVE_ALT_INT: u8 = 6;
     pub const GLOBAL_TERRAIN_ALT: u8 = 10;
     pub const GLOBAL_TERRAIN_ALT_INT: u8 = 11;
+}
+
+/// `ATTITUDE_TARGET_TYPEMASK`.
+pub mod attitude_target_typemask {
+    pub const BODY_ROLL_RATE_IGNORE: u8 = 1;
+    pub const BODY_PITCH_RATE_IGNORE: u8 = 2;
+    pub const BODY_YAW_RATE_IGNORE: u8 = 4;
+    pub const ATTITUDE_IGNORE: u8 = 128;
+}
+
+/// `POSITION_TARGET_TYPEMASK`.
+pub mod position_target_typemask {
+    pub const YAW_RATE_IGNORE: u16 = 2_048;
+}
+
+/// `ESTIMATOR_STATUS_FLAGS`.
+pub mod estimator_status {
+    /// Attitude, velocities, positions, their predictions: the flags that `EKF_STATUS_FLAGS` has at the same places.
+    pub const IN_COMMON: u16 = 1_023;
+    pub const GPS_GLITCH: u16 = 1_024;
+}
+
+/// `EKF_STATUS_FLAGS`.
+pub mod ekf_status {
+    pub const UNINITIALIZED: u16 = 1_024;
+    pub const GPS_GLITCHING: u16 = 32_768;
 }
 
 /// `MAV_PROTOCOL_CAPABILITY`.

@@ -257,6 +257,8 @@ fn numbers_have_ranges_and_kinds() {
         ("firewall = \"off\"", "found \"off\"; expected on or warn"),
         ("snoop_autopilot = \"true\"", "found \"true\"; expected true or false"),
         ("px4_release_quirk = 1979-05-27", "found a date; expected true or false"),
+        ("synthesize_286 = true", "found true; expected auto or off"),
+        ("synthesize_286 = \"on\"", "found \"on\"; expected auto or off"),
     ] {
         let (key, _) = line.split_once(' ').expect("key and value");
         assert_refused(&format!("[control]\n{line}\n"), &[&format!("c.toml:6: control.{key}: {problem}")]);
@@ -513,7 +515,7 @@ fn a_wrong_variable_is_named() {
                          GIMBALD__GIMBAL__NAME__KEY";
     let lines = [
         r#"GIMBALD__CONTROL__FIREWALL: control.firewall: found "maybe"; expected on or warn"#,
-        "GIMBALD__CONTROL__LEASE_TIMEOT_S: control.lease_timeot_s: unknown key; expected one of unclaimed, lease_timeout_s, rate_timeout_s, command_rate_timeout_s, firewall, snoop_autopilot, px4_release_quirk; did you mean lease_timeout_s?",
+        "GIMBALD__CONTROL__LEASE_TIMEOT_S: control.lease_timeot_s: unknown key; expected one of unclaimed, lease_timeout_s, rate_timeout_s, command_rate_timeout_s, firewall, snoop_autopilot, px4_release_quirk, synthesize_286; did you mean lease_timeout_s?",
         "GIMBALD__GIMBAL__CAMERA__TAKEOVER: no gimbal in the file; expected a variable of a gimbal that the file has",
         &format!("GIMBALD__HTPP__LISTEN: an unknown variable; expected {KINDS}; did you mean GIMBALD__HTTP__?"),
         "GIMBALD__LINK__GROUND__MAX_RATE_HZ: link.ground.max_rate_hz: a variable for a table; expected it to be set in the file",
@@ -609,6 +611,7 @@ command_rate_timeout_s = 0
 firewall = "warn"
 snoop_autopilot = true
 px4_release_quirk = true
+synthesize_286 = "off"
 [roi]
 altitude_reference = "amsl"
 [http]
@@ -656,6 +659,7 @@ fn every_key_arrives_where_it_belongs() {
                 firewall: Firewall::Warn,
                 snoop_autopilot: true,
                 px4_release_quirk: true,
+                synthesize_286: false,
                 roi_altitude: AltitudeReference::Amsl,
             },
         },
@@ -725,6 +729,7 @@ fn variables_override_the_file() {
         ("GIMBALD__CONTROL__FIREWALL", "warn"),
         ("GIMBALD__CONTROL__SNOOP_AUTOPILOT", "true"),
         ("GIMBALD__CONTROL__PX4_RELEASE_QUIRK", "true"),
+        ("GIMBALD__CONTROL__SYNTHESIZE_286", "off"),
         ("GIMBALD__ROI__ALTITUDE_REFERENCE", "amsl"),
         ("GIMBALD__HTTP__LISTEN", "[::1]:9090"),
         ("GIMBALD__HTTP__TOKEN_FILE", "/nowhere/token"),

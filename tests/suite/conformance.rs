@@ -10,3 +10,4 @@ mod mavsdk_trace;
 mod own_commands;
 mod rivals;
 mod spoken_for;
+mod state_for_gimbals;

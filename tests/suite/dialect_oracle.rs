@@ -5,8 +5,9 @@ use std::fmt::Debug;
 
 use gimbald::wire::dialect::{self, MavMessage as OurMessage};
 use gimbald::wire::ids::{
-    CapFlags, CommandResult, FailureFlags, GimbalFlags, command, component, mav_autopilot, mav_frame, mav_state,
-    mav_type, message, protocol_capability,
+    CapFlags, CommandResult, FailureFlags, GimbalFlags, attitude_target_typemask, command, component, ekf_status,
+    estimator_status, mav_autopilot, mav_frame, mav_state, mav_type, message, position_target_typemask,
+    protocol_capability,
 };
 use gimbald::wire::target::{known_messages, message_shape};
 use mavlink::dialects::storm32::{self as full, MavMessage as FullMessage};
@@ -215,18 +216,25 @@ fn message_ids_are_those_of_the_full_dialect() {
         (message::PARAM_SET,                          "PARAM_SET"),
         (message::ATTITUDE,                           "ATTITUDE"),
         (message::ATTITUDE_QUATERNION,                "ATTITUDE_QUATERNION"),
+        (message::LOCAL_POSITION_NED,                 "LOCAL_POSITION_NED"),
         (message::GLOBAL_POSITION_INT,                "GLOBAL_POSITION_INT"),
         (message::MANUAL_CONTROL,                     "MANUAL_CONTROL"),
         (message::COMMAND_INT,                        "COMMAND_INT"),
         (message::COMMAND_LONG,                       "COMMAND_LONG"),
         (message::COMMAND_ACK,                        "COMMAND_ACK"),
         (message::COMMAND_CANCEL,                     "COMMAND_CANCEL"),
+        (message::ATTITUDE_TARGET,                    "ATTITUDE_TARGET"),
+        (message::POSITION_TARGET_LOCAL_NED,          "POSITION_TARGET_LOCAL_NED"),
+        (message::POSITION_TARGET_GLOBAL_INT,         "POSITION_TARGET_GLOBAL_INT"),
         (message::RADIO_STATUS,                       "RADIO_STATUS"),
         (message::TIMESYNC,                           "TIMESYNC"),
         (message::AUTOPILOT_VERSION,                  "AUTOPILOT_VERSION"),
         (message::MOUNT_CONFIGURE,                    "MOUNT_CONFIGURE"),
         (message::MOUNT_CONTROL,                      "MOUNT_CONTROL"),
         (message::RADIO,                              "RADIO"),
+        (message::EKF_STATUS_REPORT,                  "EKF_STATUS_REPORT"),
+        (message::ESTIMATOR_STATUS,                   "ESTIMATOR_STATUS"),
+        (message::EXTENDED_SYS_STATE,                 "EXTENDED_SYS_STATE"),
         (message::MESSAGE_INTERVAL,                   "MESSAGE_INTERVAL"),
         (message::STATUSTEXT,                         "STATUSTEXT"),
         (message::CAMERA_INFORMATION,                 "CAMERA_INFORMATION"),
@@ -246,6 +254,41 @@ fn message_ids_are_those_of_the_full_dialect() {
     ] {
         assert_eq!(Some(ours), FullMessage::message_id_from_name(name), "{name}");
     }
+}
+
+/// "EKF_STATUS_REPORT.flags: … bit for bit with ESTIMATOR_STATUS_FLAGS" for those that mean an estimate.
+#[test]
+fn the_flags_of_both_estimators_agree_up_to_512() {
+    let estimator: Vec<_> =
+        full::EstimatorStatusFlags::all().iter_names().map(|(name, flag)| (name, flag.bits())).collect();
+    let estimator = unprefixed(&estimator, "ESTIMATOR_");
+    let ekf: Vec<_> = full::EkfStatusFlags::all().iter_names().map(|(name, flag)| (name, flag.bits())).collect();
+    let ekf = unprefixed(&ekf, "EKF_");
+    let low = |flags: &[(&'static str, u16)]| -> BTreeSet<(&'static str, u16)> {
+        flags.iter().copied().filter(|(_, bit)| estimator_status::IN_COMMON & bit != 0).collect()
+    };
+    assert_eq!(low(&estimator), low(&ekf));
+    assert_eq!(low(&estimator).iter().map(|(_, bit)| bit).sum::<u16>(), estimator_status::IN_COMMON);
+    let bit = |flags: &[(&'static str, u16)], name| flags.iter().find(|(flag, _)| *flag == name).map(|(_, bit)| *bit);
+    assert_eq!(bit(&estimator, "GPS_GLITCH"), Some(estimator_status::GPS_GLITCH));
+    assert_eq!(bit(&ekf, "GPS_GLITCHING"), Some(ekf_status::GPS_GLITCHING));
+    assert_eq!(bit(&ekf, "UNINITIALIZED"), Some(ekf_status::UNINITIALIZED));
+}
+
+#[test]
+fn type_masks_are_those_of_the_full_dialect() {
+    use attitude_target_typemask as ours;
+    use full::AttitudeTargetTypemask as Attitude;
+    for (ours, full) in [
+        (ours::BODY_ROLL_RATE_IGNORE, Attitude::ATTITUDE_TARGET_TYPEMASK_BODY_ROLL_RATE_IGNORE),
+        (ours::BODY_PITCH_RATE_IGNORE, Attitude::ATTITUDE_TARGET_TYPEMASK_BODY_PITCH_RATE_IGNORE),
+        (ours::BODY_YAW_RATE_IGNORE, Attitude::ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE),
+        (ours::ATTITUDE_IGNORE, Attitude::ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE),
+    ] {
+        assert_eq!(ours, full.bits());
+    }
+    let position = full::PositionTargetTypemask::POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE;
+    assert_eq!(position_target_typemask::YAW_RATE_IGNORE, position.bits());
 }
 
 /// Every flag that we name is the crate's flag of that name, and the crate has none that we do not name.

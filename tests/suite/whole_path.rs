@@ -1,7 +1,13 @@
 //! The way through, from a ground station's command to the gimbal's movement, with simulated peers at both ends.
 
+use std::cell::RefCell;
+use std::rc::Rc;
 use std::time::Duration;
 
+use gimbald::gimbals::mavlink_v2::sim::{Device, DeviceSettings};
+use gimbald::sim::peer::Peer;
+use gimbald::sim::vehicle::{Autopilot, StateForGimbals, Vehicle, VehicleSettings};
+use gimbald::timestamp::Timestamp;
 use gimbald::wire::dialect::{
     COMMAND_ACK_DATA, COMMAND_LONG_DATA, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA,
     MavMessage,
@@ -38,6 +44,94 @@ fn a_commanded_angle_moves_the_gimbal() {
     assert!(near(attitude.pitch_deg, -30.0) && near(attitude.yaw_vehicle_deg, 45.0), "{attitude:?}");
     let statuses: Vec<GIMBAL_DEVICE_ATTITUDE_STATUS_DATA> = world.take_messages(places.ground);
     assert!(statuses.len() >= 45, "the device's attitude reaches the ground: {}", statuses.len());
+}
+
+/// "The simulated gimbal must hold its earth yaw": on a vehicle that turns and does not tell gimbals its state, what we
+/// make of it keeps the gimbal on its direction, without drift. Where we do not, the gimbal does not know North, and says
+/// so.
+#[test]
+fn a_gimbal_keeps_its_direction_by_the_state_that_is_made_for_it() {
+    for autopilot in [Autopilot::Px4, Autopilot::ArduPilot] {
+        for synthesize_286 in [true, false] {
+            let mut settings = three_links();
+            settings.control.synthesize_286 = synthesize_286;
+            let (mut world, places) = World::empty(settings);
+            let state_for_gimbals = StateForGimbals::Denied;
+            let vehicle = VehicleSettings { autopilot, state_for_gimbals, ..VehicleSettings::default() };
+            let truth = Vehicle::new(Timestamp::ZERO, vehicle);
+            let device = Shared(Rc::new(RefCell::new(Device::new(Timestamp::ZERO, DeviceSettings::default()))));
+            world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, vehicle));
+            world.install(places.gimbal, device.clone());
+            // The gimbal is really turned with the vehicle, whatever it believes.
+            let fly_for = |world: &mut World, seconds: u64| {
+                for _ in 0..seconds * 100 {
+                    world.disturb(places.gimbal, truth.platform_motion(world.now));
+                    world.run_for(Duration::from_millis(10));
+                }
+            };
+            fly_for(&mut world, 10);
+
+            world.send(places.ground, GCS, &pitchyaw(-20.0, 120.0, 92.0));
+            fly_for(&mut world, 10);
+            world.forget();
+            let mut worst: f64 = 0.0;
+            for _ in 0..20 {
+                fly_for(&mut world, 1);
+                worst = worst.max((device.yaw_from_north_deg(world.now) - 120.0).abs());
+            }
+
+            let turned = truth.motion(world.now).heading_rate.degrees_per_second() * 20.0;
+            assert!(turned > 140.0, "the vehicle turns, by {turned}°");
+            let flags: Vec<u16> = world
+                .take_messages::<GIMBAL_DEVICE_SET_ATTITUDE_DATA>(places.gimbal)
+                .iter()
+                .map(|told| told.flags)
+                .collect();
+            let expected = if synthesize_286 { 92 } else { 44 };
+            assert!(flags.len() > 300 && flags.iter().all(|flags| *flags == expected), "{autopilot:?}: {flags:?}");
+            if synthesize_286 {
+                assert!(worst < 0.1, "{autopilot:?}: {worst}°");
+            }
+        }
+    }
+}
+
+/// A simulated gimbal at a place, and to look at.
+#[derive(Clone)]
+struct Shared(Rc<RefCell<Device>>);
+
+impl Shared {
+    /// Where it really points.
+    fn yaw_from_north_deg(&self, now: Timestamp) -> f64 {
+        let device = self.0.borrow();
+        (device.plant().platform_heading(now) + device.plant().pose().yaw).wrapped().degrees()
+    }
+}
+
+impl Peer for Shared {
+    fn handle_received(&mut self, now: Timestamp, bytes: &[u8]) {
+        self.0.borrow_mut().handle_received(now, bytes);
+    }
+
+    fn handle_timeout(&mut self, now: Timestamp) {
+        self.0.borrow_mut().handle_timeout(now);
+    }
+
+    fn poll_output(&mut self) -> Option<Vec<u8>> {
+        self.0.borrow_mut().poll_output()
+    }
+
+    fn poll_timeout(&self) -> Option<Timestamp> {
+        self.0.borrow().poll_timeout()
+    }
+
+    fn handle_reboot(&mut self, now: Timestamp) {
+        self.0.borrow_mut().handle_reboot(now);
+    }
+
+    fn handle_disturbance(&mut self, now: Timestamp, motion: gimbald::sim::peer::PlatformMotion) {
+        self.0.borrow_mut().handle_disturbance(now, motion);
+    }
 }
 
 fn pitchyaw(pitch: f32, yaw: f32, flags: f32) -> MavMessage {

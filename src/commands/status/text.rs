@@ -106,6 +106,13 @@ fn vehicle(out: &mut Lines, vehicle: &VehicleSnapshot) {
             age(vehicle.position_age_ms)
         ),
     );
+    let told = match vehicle.state_for_gimbal.as_deref() {
+        Some("synthesized") => "get its state from us",
+        Some(_) => "get its state",
+        None => "",
+    };
+    out.fact_unless_empty("gimbals", told);
+    out.fact_unless_empty("stale", &vehicle.stale.join(" "));
 }
 
 fn gimbal(out: &mut Lines, gimbal: &GimbalSnapshot) {
@@ -299,6 +306,7 @@ links
 vehicle  alive  ardupilot  system 1
   attitude  roll 2.5°  pitch -1.3°  heading 87.0°  12 ms ago
   position  47.397742° 8.545594°  488.5 m above mean sea level  95 ms ago
+  gimbals   get its state from us
 
 gimbal camera  alive  mavlink_v2  device 1/154  manager 191
   product   Acme Pixy 7.8.1
@@ -337,6 +345,17 @@ gimbals
   none yet
 ";
         assert_eq!(report(&Snapshot::default()), expected);
+    }
+
+    #[test]
+    fn what_is_too_old_to_act_on_is_named() {
+        let vehicle = VehicleSnapshot {
+            stale: vec!["heading".to_owned(), "position".to_owned()],
+            state_for_gimbal: Some("autopilot".to_owned()),
+            ..VehicleSnapshot::default()
+        };
+        let report = report(&Snapshot { vehicle, ..Snapshot::default() });
+        assert!(report.contains("\n  gimbals   get its state\n  stale     heading position\n"), "{report}");
     }
 
     #[test]

@@ -72,6 +72,10 @@ impl Vehicle {
     }
 
     fn handle_command(&mut self, now: Timestamp, command: &Command) {
+        let asks_for_message = matches!(command.number, command::REQUEST_MESSAGE | command::SET_MESSAGE_INTERVAL);
+        if asks_for_message && self.ignores(command.message_id()) {
+            return;
+        }
         let result = match command.number {
             command::REQUEST_MESSAGE => return self.handle_request_message(now, command, command.message_id()),
             command::REQUEST_AUTOPILOT_CAPABILITIES => {
@@ -112,7 +116,7 @@ impl Vehicle {
         if is_known {
             command.acknowledge(&mut self.outbox, CommandResult::Accepted);
             self.report(now, id);
-        } else if self.is_mount_message(id) {
+        } else if self.is_mount_message(id) || self.promises(id) {
             // Without a mount ArduPilot accepts, and sends nothing (observed on its simulator).
             command.acknowledge(&mut self.outbox, CommandResult::Accepted);
         } else if command.is_directed() {
@@ -126,7 +130,7 @@ impl Vehicle {
 
     fn handle_set_message_interval(&mut self, now: Timestamp, command: &Command) -> CommandResult {
         let id = command.message_id();
-        if self.is_mount_message(id) || self.streams.set_interval(now, id, command.params[1]) {
+        if self.is_mount_message(id) || self.promises(id) || self.streams.set_interval(now, id, command.params[1]) {
             CommandResult::Accepted
         } else {
             CommandResult::Denied
@@ -192,7 +196,7 @@ impl Vehicle {
             // An answer, and it did not ask.
             return;
         }
-        let nanoseconds = i64::try_from(now.since(self.boot).as_nanos()).unwrap_or(i64::MAX);
+        let nanoseconds = i64::try_from(self.clock(now).as_micros() * 1_000).unwrap_or(i64::MAX);
         self.outbox.send(&TIMESYNC_DATA {
             tc1: nanoseconds,
             ts1: request.ts1,

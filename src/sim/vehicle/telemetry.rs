@@ -3,15 +3,15 @@
 use std::time::Duration;
 
 use super::flight::{self, HEIGHT_M, HOME, Motion, SPEED_MPS};
-use super::{Autopilot, Vehicle};
+use super::{Autopilot, StateForGimbals, Vehicle};
 use crate::geometry::{Angle, Attitude, EarthFrame, Position};
 use crate::timestamp::Timestamp;
 use crate::wire::dialect::{
-    ATTITUDE_DATA, ATTITUDE_QUATERNION_DATA, AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA, AUTOPILOT_VERSION_DATA,
-    BATTERY_STATUS_DATA, EKF_STATUS_REPORT_DATA, ESTIMATOR_STATUS_DATA, EXTENDED_SYS_STATE_DATA,
-    GLOBAL_POSITION_INT_DATA, GPS_RAW_INT_DATA, HEARTBEAT_DATA, HOME_POSITION_DATA, LOCAL_POSITION_NED_DATA,
-    MISSION_CURRENT_DATA, MessageData, PROTOCOL_VERSION_DATA, RC_CHANNELS_DATA, SYS_STATUS_DATA, SYSTEM_TIME_DATA,
-    VFR_HUD_DATA,
+    ATTITUDE_DATA, ATTITUDE_QUATERNION_DATA, ATTITUDE_TARGET_DATA, AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA,
+    AUTOPILOT_VERSION_DATA, BATTERY_STATUS_DATA, EKF_STATUS_REPORT_DATA, ESTIMATOR_STATUS_DATA,
+    EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, GPS_RAW_INT_DATA, HEARTBEAT_DATA, HOME_POSITION_DATA,
+    LOCAL_POSITION_NED_DATA, MISSION_CURRENT_DATA, MessageData, PROTOCOL_VERSION_DATA, RC_CHANNELS_DATA,
+    SYS_STATUS_DATA, SYSTEM_TIME_DATA, VFR_HUD_DATA,
 };
 use crate::wire::ids::{component, mav_autopilot, mav_state, mav_type, message};
 
@@ -25,6 +25,7 @@ pub(super) const EKF_STATUS_REPORT: u32 = EKF_STATUS_REPORT_DATA::ID;
 pub(super) const ESTIMATOR_STATUS: u32 = ESTIMATOR_STATUS_DATA::ID;
 pub(super) const HOME_POSITION: u32 = HOME_POSITION_DATA::ID;
 pub(super) const EXTENDED_SYS_STATE: u32 = EXTENDED_SYS_STATE_DATA::ID;
+pub(super) const ATTITUDE_TARGET: u32 = ATTITUDE_TARGET_DATA::ID;
 pub(super) const PROTOCOL_VERSION: u32 = PROTOCOL_VERSION_DATA::ID;
 
 /// `MAV_MODE_FLAG`.
@@ -57,7 +58,7 @@ mod capability {
 }
 
 /// What is sent unasked, and how many milliseconds apart; without a number, only on request.
-pub(super) fn usual_streams(autopilot: Autopilot, tells_gimbals: bool) -> Vec<(u32, Option<Duration>)> {
+pub(super) fn usual_streams(autopilot: Autopilot, state: StateForGimbals) -> Vec<(u32, Option<Duration>)> {
     let family = match autopilot {
         Autopilot::Px4 => (ESTIMATOR_STATUS, 500),
         Autopilot::ArduPilot => (EKF_STATUS_REPORT, 500),
@@ -77,10 +78,11 @@ pub(super) fn usual_streams(autopilot: Autopilot, tells_gimbals: bool) -> Vec<(u
         (BATTERY_STATUS, 2000),
         (HOME_POSITION, 2000),
         (EXTENDED_SYS_STATE, 1000),
+        (ATTITUDE_TARGET, 100),
         family,
     ];
     let mut streams: Vec<_> = every.into_iter().map(|(id, millis)| (id, Some(Duration::from_millis(millis)))).collect();
-    if tells_gimbals {
+    if state == StateForGimbals::Told {
         let interval = (autopilot == Autopilot::Px4).then_some(Duration::from_millis(50));
         streams.push((message::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE, interval));
     }
@@ -93,8 +95,8 @@ impl Vehicle {
     pub(super) fn report(&mut self, now: Timestamp, id: u32) -> bool {
         let flown = Timestamp::ZERO + now.since(self.boot);
         let motion = flight::motion_at(flown);
-        let time_boot_ms = flown.boot_ms();
-        let time_usec = flown.as_micros();
+        let time_boot_ms = self.clock(now).boot_ms();
+        let time_usec = self.clock(now).as_micros();
         let system = self.id().system;
         let out = &mut self.outbox;
         match id {
@@ -151,6 +153,18 @@ impl Vehicle {
                     pitchspeed,
                     yawspeed,
                     repr_offset_q: [0.0; 4],
+                });
+            }
+            ATTITUDE_TARGET => {
+                let [body_roll_rate, body_pitch_rate, body_yaw_rate] = body_rates(&motion);
+                out.send(&ATTITUDE_TARGET_DATA {
+                    time_boot_ms,
+                    q: quaternion(&motion),
+                    body_roll_rate,
+                    body_pitch_rate,
+                    body_yaw_rate,
+                    thrust: 0.45,
+                    type_mask: 0,
                 });
             }
             LOCAL_POSITION_NED => {
@@ -305,6 +319,11 @@ fn state_for_gimbals(
     let (target_system, landed_state, angular_velocity_z) = match autopilot {
         Autopilot::Px4 => (0, IN_AIR, 0.0),
         Autopilot::ArduPilot => (system, 0, heading_rate),
+    };
+    let time_boot_us = match autopilot {
+        Autopilot::Px4 => time_boot_us,
+        // A counter of 32 bits, widened.
+        Autopilot::ArduPilot => time_boot_us & u64::from(u32::MAX),
     };
     let [vx, vy, vz] = motion.velocity_mps.map(|speed| speed as f32);
     AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA {

@@ -229,7 +229,8 @@ fn the_state_for_gimbals_is_streamed_or_asked_for() {
     assert_eq!((first.target_system, first.target_component, first.landed_state), (0, 0, 2));
     assert_eq!(first.angular_velocity_z, 0.0);
 
-    let mut silent = Flight::with(VehicleSettings { tells_gimbals: false, ..VehicleSettings::default() });
+    let mut silent =
+        Flight::with(VehicleSettings { state_for_gimbals: StateForGimbals::Denied, ..VehicleSettings::default() });
     assert_eq!(ack(&silent.ask(&long(command::SET_MESSAGE_INTERVAL, [286.0, 40_000.0, 0.0]))), (511, 2));
     silent.run_for(2000);
     assert_eq!(silent.count(state), 0);

@@ -40,6 +40,9 @@ const VEHICLE: &[&str] = &[
     "longitude_deg",
     "altitude_amsl_m",
     "position_age_ms",
+    "yaw_rate_dps",
+    "state_for_gimbal",
+    "stale",
 ];
 const GIMBAL: &[&str] = &[
     "name",

@@ -9,7 +9,7 @@ use gimbald::bridge::settings::{LinkSettings, Role, Settings, SystemId, Transpor
 use gimbald::bridge::snapshot::Snapshot;
 use gimbald::bridge::{Bridge, ChannelId, Input, Output};
 use gimbald::gimbals::mavlink_v2::sim::{Device, DeviceSettings};
-use gimbald::sim::peer::Peer;
+use gimbald::sim::peer::{Peer, PlatformMotion};
 use gimbald::sim::vehicle::{Vehicle, VehicleSettings};
 use gimbald::timestamp::Timestamp;
 use gimbald::wire::dialect::{HEARTBEAT_DATA, MavMessage, MessageData};
@@ -144,6 +144,23 @@ impl World {
     /// Ends the peer at a place.
     pub fn remove(&mut self, place: Place) {
         self.ends[place.0].peer = None;
+    }
+
+    /// Starts the peer at a place over, as after a power-on.
+    pub fn reboot(&mut self, place: Place) {
+        let now = self.now;
+        self.peer(place).handle_reboot(now);
+    }
+
+    /// The peer at a place is moved as the vehicle moves that carries it.
+    pub fn disturb(&mut self, place: Place, motion: PlatformMotion) {
+        let now = self.now;
+        self.peer(place).handle_disturbance(now, motion);
+        self.settle();
+    }
+
+    fn peer(&mut self, place: Place) -> &mut dyn Peer {
+        self.ends[place.0].peer.as_deref_mut().expect("somebody lives there")
     }
 
     /// Bytes from a place, as one read.
