@@ -109,9 +109,10 @@ fn what_is_not_known_is_null() {
     assert_has(&status, TOP);
     assert_has(&status["links"][0], LINK);
     assert_has(&status["vehicle"], VEHICLE);
-    for field in VEHICLE.iter().filter(|field| **field != "alive") {
+    for field in VEHICLE.iter().filter(|field| !["alive", "stale"].contains(*field)) {
         assert_eq!(status["vehicle"][field], Value::Null, "{field}");
     }
+    assert_eq!(status["vehicle"]["stale"], serde_json::json!([]), "what was never known is not old");
     assert_eq!((&status["vehicle"]["alive"], &status["system_id"]), (&Value::Bool(false), &Value::from(1)));
     let (_, text) = daemon.get("/api/v1/status").expect("an answer");
     assert!(!text.contains("NaN") && !text.contains("nan"), "{text}");
