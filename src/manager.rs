@@ -15,6 +15,7 @@ pub mod tracking;
 pub mod voice;
 
 mod commands;
+mod heading;
 mod inquiries;
 mod mount;
 mod roi;
@@ -36,6 +37,7 @@ use crate::wire::{MavId, Target};
 use commands::LastCommand;
 use control::{Change, Control, PRIMARY_SILENCE, Place, Policy, Voice};
 use events::{Event, RatesEnd};
+use heading::HeadingBias;
 use intervals::{DEFAULT_STATUS_INTERVAL, Schedule};
 use messages::Interval;
 use mount::ConfiguredInputs;
@@ -135,9 +137,7 @@ pub struct GimbalManager {
     voice: Option<DeviceVoice>,
     /// When whose demand is being carried out was last heard.
     source_heard: Timestamp,
-    /// What the gimbal's idea of the vehicle's heading has more than the autopilot's; carries over the time when the
-    /// gimbal does not tell it, so that the camera stays where it is.
-    heading_bias: Angle,
+    heading_bias: HeadingBias,
     /// When the primary last made a demand.
     primary_demand: Option<Timestamp>,
     /// The flags that the last 281 carried.
@@ -169,7 +169,7 @@ impl GimbalManager {
             information_schedule: Schedule::new(Interval::Off),
             voice,
             source_heard: Timestamp::ZERO,
-            heading_bias: Angle::ZERO,
+            heading_bias: HeadingBias::default(),
             primary_demand: None,
             told_flags: GimbalFlags::empty(),
             told_roi: None,
@@ -230,19 +230,19 @@ impl GimbalManager {
 
     /// News from the driver.
     pub fn handle_report(&mut self, now: Timestamp, report: Report, around: Surroundings<'_>) {
-        if !matches!(report, Report::Attitude(_)) {
+        if !matches!(report, Report::Attitude(_) | Report::Malformed { .. }) {
             self.last_command = None;
         }
         match report {
             Report::Restarted => {
                 self.tracking.forget();
-                self.heading_bias = Angle::ZERO;
+                self.heading_bias = HeadingBias::default();
                 self.tell(Event::Restarted { device: self.device });
             }
             Report::Alive { device } => {
                 if self.device != Some(device) {
                     self.tracking.forget();
-                    self.heading_bias = Angle::ZERO;
+                    self.heading_bias = HeadingBias::default();
                     self.identity = Identity::default();
                     self.capabilities = None;
                     self.status = None;
@@ -263,12 +263,17 @@ impl GimbalManager {
             }
             Report::Attitude(status) => {
                 if let (Some(of_gimbal), Some(of_vehicle)) = (status.heading, around.vehicle.heading(now)) {
-                    self.heading_bias = (of_gimbal - of_vehicle).wrapped();
+                    self.heading_bias.handle_headings(now, of_gimbal, of_vehicle);
                 }
                 if let Some(voice) = &mut self.voice {
                     voice.handle_status(status);
                 }
                 self.status = Some((now, status));
+            }
+            Report::Malformed { reason } => {
+                if let Some(device) = self.device {
+                    self.count_refusal(device, reason);
+                }
             }
             Report::Lost => {
                 self.state = DeviceState::Lost;
@@ -409,6 +414,11 @@ impl GimbalManager {
         &self.tracking
     }
 
+    /// By how much the gimbal takes the vehicle's heading for another than the autopilot does, where that is much.
+    pub fn heading_apart(&self, now: Timestamp) -> Option<Angle> {
+        self.heading_bias.apart(now).filter(|_| self.status.is_some())
+    }
+
     /// What was refused, by sender and reason.
     pub fn rejected(&self) -> &BTreeMap<MavId, BTreeMap<&'static str, u64>> {
         &self.rejected
@@ -517,7 +527,7 @@ impl GimbalManager {
 
     fn situation<'a>(&self, now: Timestamp, capabilities: &'a Capabilities, around: Surroundings<'_>) -> Situation<'a> {
         let status = self.status.filter(|(at, _)| now.since(*at) <= ATTITUDE_STALE).map(|(_, status)| status);
-        let of_vehicle = || around.vehicle.heading(now).map(|heading| (heading + self.heading_bias).wrapped());
+        let of_vehicle = || around.vehicle.heading(now).map(|heading| self.heading_bias.applied_to(heading));
         Situation {
             measured: status,
             heading: status.and_then(|status| status.heading).or_else(of_vehicle),

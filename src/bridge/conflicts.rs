@@ -43,6 +43,8 @@ pub enum Conflict {
     AutopilotTwice { autopilot: MavId, other_on: LinkIndex },
     /// A gimbal on another system id than the vehicle's; it is managed where its link is one of gimbals.
     ForeignSystem { device: MavId, system: u8, is_managed: bool },
+    /// A gimbal takes the vehicle's heading for another than the autopilot does, by so much to the right.
+    HeadingsApart { device: MavId, degrees: i16 },
     /// No manager component id is left.
     NoManagerLeft { device: MavId },
 }
@@ -70,6 +72,7 @@ impl Conflict {
             (Self::StationTwice { station, .. }, Self::StationTwice { station: other, .. }) => station == other,
             (Self::ForeignSystem { device, .. }, Self::ForeignSystem { device: other, .. }) => device == other,
             (Self::FallbackTaken { .. }, Self::FallbackTaken { .. }) => true,
+            (Self::HeadingsApart { device, .. }, Self::HeadingsApart { device: other, .. }) => device == other,
             _ => self == other,
         }
     }
@@ -147,6 +150,12 @@ impl Conflict {
             Self::ForeignSystem { device, system, is_managed: false } => format!(
                 "gimbal {device} is not managed: it is not on the vehicle's system id {system}, and not on a link of \
                  role gimbal. Set its system id to {system}, or restart it."
+            ),
+            Self::HeadingsApart { device, degrees } => format!(
+                "gimbal {device} takes the nose of the vehicle to be {}° further {} than the autopilot does. Switch it on \
+                 while it looks straight ahead, or calibrate its compass.",
+                degrees.unsigned_abs(),
+                if *degrees < 0 { "left" } else { "right" }
             ),
             Self::NoManagerLeft { device } => format!(
                 "gimbal {device} is not managed: the component ids 191 to 194 are taken. Give it a [[gimbal]] entry \

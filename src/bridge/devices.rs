@@ -101,6 +101,16 @@ impl Bridge {
         }
     }
 
+    /// Whether gimbals and autopilot agree where the nose points.
+    pub(super) fn compare_headings(&mut self, now: Timestamp) {
+        for gimbal in self.roster.iter() {
+            if let (Some(device), Some(apart)) = (gimbal.manager.device(), gimbal.manager.heading_apart(now)) {
+                let degrees = apart.degrees().round() as i16;
+                self.conflicts.note(now, Conflict::HeadingsApart { device, degrees });
+            }
+        }
+    }
+
     /// Once a second: whether a device that was lost has another component id now.
     pub(super) fn look_for_renamed(&mut self, now: Timestamp) {
         for Renamed { former, device } in self.roster.give_up_renamed(now) {

@@ -30,6 +30,7 @@ impl Bridge {
         if self.identity.has_several(now) && self.settings.system_id == SystemId::Auto {
             self.conflicts.note(now, Conflict::SeveralAutopilots);
         }
+        self.compare_headings(now);
         self.look_for_renamed(now);
         self.remind_devices(now);
         self.look_after_streams(now);

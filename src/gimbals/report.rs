@@ -17,6 +17,11 @@ pub enum Report {
     /// Enough is known of the device to steer it, or something of that has changed.
     Known(Identity, Capabilities),
     Attitude(GimbalStatus),
+    /// It said where it looks in a way that cannot be believed.
+    Malformed {
+        /// A word for the counters and the person looking.
+        reason: &'static str,
+    },
     /// Nothing was heard of it for too long.
     Lost,
 }

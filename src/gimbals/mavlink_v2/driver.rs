@@ -157,7 +157,13 @@ impl MavlinkV2Driver {
         }
         self.sets_frame_bits |=
             status.flags.intersects(GimbalFlags::YAW_IN_VEHICLE_FRAME | GimbalFlags::YAW_IN_EARTH_FRAME);
-        let Some(attitude) = status.attitude else { return };
+        let attitude = match status.attitude {
+            Ok(attitude) => attitude,
+            Err(reason) => {
+                self.outputs.push_back(DriverOutput::Report(Report::Malformed { reason }));
+                return;
+            }
+        };
         let heading = self.trusted_heading(&status);
         let accepts_earth_yaw = self.accepts_earth_yaw(status.flags);
         self.outputs.push_back(DriverOutput::Report(Report::Attitude(GimbalStatus {

@@ -81,8 +81,8 @@ fn text<const N: usize>(raw: &CharArray<N>) -> String {
 pub struct DeviceStatus {
     /// Time since the device's start, milliseconds.
     pub boot_ms: u32,
-    /// `None` when the quaternion is malformed, or when both frame bits are set.
-    pub attitude: Option<GimbalAttitude>,
+    /// Why there is none is a word for the counters: the quaternion is malformed, or both frame bits are set.
+    pub attitude: Result<GimbalAttitude, &'static str>,
     pub rates: [Option<AngularRate>; 3],
     pub flags: GimbalFlags,
     pub failures: FailureFlags,
@@ -100,9 +100,9 @@ pub fn read_status(frame: &Frame<'_>) -> Option<DeviceStatus> {
     let flags = GimbalFlags::from_bits_retain(message.flags);
     let rate = |value: f32| value.is_finite().then(|| AngularRate::from_radians_per_second(f64::from(value)));
     let attitude = match yaw_frame(flags) {
-        Some(YawFrame::Vehicle) => Attitude::from_wxyz(message.q).ok().flatten().map(GimbalAttitude::InVehicleFrame),
-        Some(YawFrame::Earth) => Attitude::from_wxyz(message.q).ok().flatten().map(GimbalAttitude::InEarthFrame),
-        None => None,
+        Some(YawFrame::Vehicle) => attitude(message.q).map(GimbalAttitude::InVehicleFrame),
+        Some(YawFrame::Earth) => attitude(message.q).map(GimbalAttitude::InEarthFrame),
+        None => Err("both_yaw_frames"),
     };
     Some(DeviceStatus {
         boot_ms: message.time_boot_ms,
@@ -114,6 +114,10 @@ pub fn read_status(frame: &Frame<'_>) -> Option<DeviceStatus> {
         extended: frame.payload().len() > STATUS_BASE_LEN,
         gimbal_device_id: message.gimbal_device_id,
     })
+}
+
+fn attitude<F>(q: [f32; 4]) -> Result<Attitude<F>, &'static str> {
+    Attitude::from_wxyz(q).ok().flatten().ok_or("malformed_quaternion")
 }
 
 /// 284 for `device`. Exactly one frame bit is set, and `YAW_LOCK` exactly with the earth frame.

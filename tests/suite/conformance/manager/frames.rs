@@ -1,12 +1,13 @@
 //! What yaw is measured from (protocol checklist 8.7).
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use gimbald::bridge::snapshot::AttitudeSnapshot;
 use gimbald::wire::MavId;
 use gimbald::wire::dialect::{GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, MavMessage};
 
-use super::{SECOND, assert_near, only_setpoint, run_looking, setpoints, with_gimbal};
+use super::{SECOND, assert_near, look, only_setpoint, run_looking, setpoints, with_gimbal};
 use crate::support::script::{
     ACCEPTED, NAN, TEMPORARILY_REJECTED, autopilot_state, device_status, pitch_yaw_deg, pitchyaw, px4_heartbeat,
     quaternion,
@@ -84,6 +85,70 @@ fn item_107_a_heading_that_was_not_sent_is_not_north() {
     for len in [37, 38, 40] {
         world.send_bytes(places.gimbal, &frame_v2(285, 137, 0, &payload[..len], None));
         assert_near(attitude(&world).yaw_earth_deg.expect("known"), 40.0, 0.01);
+    }
+}
+
+/// "When 285 sets both 32 and 64, attitude is not updated, a counter rises." A-03: so it is with a quaternion that is none.
+#[test]
+fn item_114_an_attitude_in_two_frames_is_not_believed() {
+    for (flags, q, reason) in [
+        (32 | 64, quaternion(-20.0, 50.0), "both_yaw_frames"),
+        (4 | 8 | 16 | 32 | 64, quaternion(-20.0, 50.0), "both_yaw_frames"),
+        (44, [0.0; 4], "malformed_quaternion"),
+        (44, [NAN; 4], "malformed_quaternion"),
+        (44, [f32::INFINITY, 0.0, 0.0, 0.0], "malformed_quaternion"),
+    ] {
+        let (mut world, places) = with_gimbal();
+        look(&mut world, places, -10.0, 5.0);
+        for told in 1..=3 {
+            let status = GIMBAL_DEVICE_ATTITUDE_STATUS_DATA { q, ..device_status(world.now, flags, 0.0, 0.0) };
+            world.forget();
+            let sent = world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status));
+
+            let shown = attitude(&world);
+            assert_near(shown.pitch_deg.expect("known"), -10.0, 0.01);
+            assert_near(shown.yaw_vehicle_deg.expect("known"), 5.0, 0.01);
+            let gimbal = &world.snapshot().gimbals[0];
+            assert_eq!(gimbal.state, "alive");
+            assert_eq!(gimbal.rejected["1/154"], BTreeMap::from([(reason.to_owned(), told)]));
+            assert_eq!(world.take(places.ground)[0].bytes, sent, "it is the device's, and passes");
+        }
+    }
+}
+
+/// "warn when |heading − gimbal heading| drifts": a gimbal that takes another direction for the vehicle's is told
+/// of, as long as it does, and nothing moves because of it.
+#[test]
+fn a_gimbal_with_a_heading_of_its_own_is_told_of() {
+    let (mut world, places) = with_gimbal();
+    assert_eq!(world.result_of(places.ground, GCS, &pitchyaw(-20.0, 10.0, NAN, NAN, 44.0)), Some(ACCEPTED));
+    let told = |world: &World| world.snapshot().conflicts;
+    for (of_gimbal, seconds, expected) in [
+        (25.0, 15, None),
+        (-30.0, 8, None),
+        (-30.0, 4, Some("gimbal 1/154 takes the nose of the vehicle to be 40° further left than the autopilot does")),
+        // Half a minute after the last time it is over.
+        (10.0, 31, None),
+        (100.0, 12, Some("gimbal 1/154 takes the nose of the vehicle to be 90° further right than the autopilot does")),
+    ] {
+        for _ in 0..seconds * 2 {
+            turn_vehicle(&mut world, places, 10.0);
+            let status = device_status(world.now, 44, -20.0, 10.0);
+            let delta_yaw = f32::to_radians(of_gimbal);
+            let status = GIMBAL_DEVICE_ATTITUDE_STATUS_DATA { delta_yaw, ..status };
+            world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status));
+            world.run_for(SECOND / 2);
+        }
+        let conflicts = told(&world);
+        match expected {
+            None => assert_eq!(conflicts, Vec::<String>::new(), "{of_gimbal}"),
+            Some(text) => assert!(conflicts.len() == 1 && conflicts[0].starts_with(text), "{conflicts:?}"),
+        }
+    }
+    for (_, setpoint) in setpoints(&mut world, places) {
+        let (pitch, yaw) = pitch_yaw_deg(setpoint.q);
+        assert_near(pitch, -20.0, 0.01);
+        assert_near(yaw, 10.0, 0.01);
     }
 }
 
