@@ -1,5 +1,6 @@
 //! What more than one test needs.
 
+pub mod control_rule;
 pub mod daemon;
 pub mod ground_station;
 pub mod hub;

@@ -5,6 +5,7 @@ mod answers;
 mod bad_days;
 mod commands;
 mod control;
+mod control_matrix;
 mod control_nudge;
 mod control_takeover;
 mod control_war;
