@@ -1,6 +1,6 @@
 """MAVSDK 1.4, which many scripts still use: every call of its gimbal plugin through its own server.
 
-It can only listen, so the daemon speaks first.
+Client checklist E137: the same as with newer ones. It can only listen, so the daemon speaks first.
 """
 
 from importlib.metadata import version

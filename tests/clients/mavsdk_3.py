@@ -1,6 +1,7 @@
 """MAVSDK 3: every call of its gimbal plugin through its own server.
 
-The id that it lists is not the one that its calls take: that is the one in the stream of attitudes.
+Client checklist E136: "the same, with the gimbal id taken from the attitude stream": the id that it lists is not the one
+that its calls take.
 """
 
 import time

@@ -1,4 +1,8 @@
-"""MAVSDK 4, the native library: every call of its gimbal plugin, with PX4 and with ArduPilot."""
+"""MAVSDK 4, the native library: every call of its gimbal plugin, with PX4 and with ArduPilot.
+
+Client checklist E135: "list, take control, angles, rates, lock, ROI, attitude, status, release with the real library all
+succeed."
+"""
 
 import time
 

@@ -255,6 +255,8 @@ class Vocabulary:
         self.client.wait_owner("NONE", other.ids, NOBODY)
 
     def is_refused(self, other):
+        """Client checklist E138: "setpoints are refused while another client holds primary control, and the owner is
+        visible"."""
         client = self.client
         before, count = self.rig.refusals(client.ids), 0
         for once in (once for _, once in self.ways):

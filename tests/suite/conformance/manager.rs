@@ -3,6 +3,7 @@
 mod angles;
 mod answers;
 mod bad_days;
+mod client_control;
 mod commands;
 mod control;
 mod control_matrix;

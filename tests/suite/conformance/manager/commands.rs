@@ -329,6 +329,7 @@ fn item_180_what_is_not_known_is_null() {
 }
 
 /// A frame that is cut anywhere by the sender's rule on zeros is read the same: `confirmation` and targets read 0.
+/// Client checklist E96: "Truncated trailing zeros (COMMAND_LONG of 32 bytes, COMMAND_INT of 33) decode well."
 #[test]
 fn item_131_a_shortened_command_is_a_command() {
     let (mut world, places) = with_gimbal();
@@ -350,4 +351,17 @@ fn item_131_a_shortened_command_is_a_command() {
     let sent = world.send(places.ground, GCS, &command);
     assert_eq!(sent[1], 30, "three bytes are cut off");
     assert_eq!(ids(&world.take(places.ground)), [77, 280]);
+
+    for (command, length, yaw) in [
+        // `confirmation`.
+        (pitchyaw(-10.0, 20.0, NAN, NAN, 44.0), 32, 20.0),
+        // `autocontinue` and `current`.
+        (command_int(MANAGER, 1000, [-10.0, 40.0, NAN, NAN], 44, 0, 154.0), 33, 40.0),
+    ] {
+        world.forget();
+        let sent = world.send(places.ground, GCS, &command);
+        assert_eq!(sent[1], length);
+        assert_eq!(of::<COMMAND_ACK_DATA>(&world.take(places.ground)), [ack(GCS, 1000, ACCEPTED)]);
+        assert_near(pitch_yaw_deg(only_setpoint(&mut world, places).q).1, yaw, 0.01);
+    }
 }
