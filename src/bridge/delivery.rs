@@ -105,7 +105,7 @@ impl Bridge {
         let Some(heartbeat) = frame.decode::<HEARTBEAT_DATA>() else { return };
         self.ranks.handle_heartbeat(now, source, heartbeat.mavtype);
         if heartbeat.mavtype == mav_type::GCS {
-            self.note_station(now, source, place);
+            self.note_station(now, place, frame);
         }
         // "HEARTBEAT.autopilot other than INVALID" is an autopilot; but old gimbals send GENERIC there.
         let is_autopilot =
@@ -150,8 +150,10 @@ impl Bridge {
         }
     }
 
-    fn note_station(&mut self, now: Timestamp, station: MavId, place: Place) {
-        let Some(other) = self.stations.handle_heartbeat(now, station, place.channel) else { return };
+    fn note_station(&mut self, now: Timestamp, place: Place, frame: &Frame<'_>) {
+        let station = frame.source();
+        let other = self.stations.handle_heartbeat(now, station, place.channel, frame.sequence());
+        let Some(other) = other else { return };
         if let Some((other_link, _)) = self.channels.link_of(other) {
             self.conflicts.note(now, Conflict::StationTwice { station, links: [place.link, other_link] });
         }

@@ -25,25 +25,33 @@ struct Station {
     id: MavId,
     channel: ChannelId,
     heard: Timestamp,
+    /// The number of the heartbeat heard last there. One that has it elsewhere has come by two ways.
+    sequence: u8,
     /// Where it was heard since.
     elsewhere: Option<ChannelId>,
 }
 
 impl Stations {
     /// A ground station beat on `channel`; the other channel on which it was heard while it was on this one.
-    pub fn handle_heartbeat(&mut self, now: Timestamp, id: MavId, channel: ChannelId) -> Option<ChannelId> {
+    pub fn handle_heartbeat(
+        &mut self,
+        now: Timestamp,
+        id: MavId,
+        channel: ChannelId,
+        sequence: u8,
+    ) -> Option<ChannelId> {
         let Some(station) = self.known.iter_mut().find(|station| station.id == id) else {
             self.make_room();
-            self.known.push(Station { id, channel, heard: now, elsewhere: None });
+            self.known.push(Station { id, channel, heard: now, sequence, elsewhere: None });
             return None;
         };
         if station.channel == channel {
-            station.heard = now;
+            (station.heard, station.sequence) = (now, sequence);
             return station.elsewhere.take();
         }
         if now.since(station.heard) >= LEFT_AFTER {
-            *station = Station { id, channel, heard: now, elsewhere: None };
-        } else {
+            *station = Station { id, channel, heard: now, sequence, elsewhere: None };
+        } else if station.sequence != sequence {
             station.elsewhere = Some(channel);
         }
         None
@@ -70,7 +78,11 @@ mod tests {
     fn a_station_that_moved_is_one() {
         let mut stations = Stations::default();
         let on = |channel| ChannelId::new(channel).expect("below the bound");
-        let mut beat = |second, channel| stations.handle_heartbeat(Timestamp::from_secs(second), STATION, on(channel));
+        let mut beat = |second, channel| {
+            // Each connection of a station has numbers of its own.
+            let sequence = second as u8 + 100 * channel as u8;
+            stations.handle_heartbeat(Timestamp::from_secs(second), STATION, on(channel), sequence)
+        };
         for second in 0..10 {
             assert_eq!(beat(second, 0), None);
         }
@@ -79,5 +91,18 @@ mod tests {
         }
         assert_eq!(beat(30, 0), None);
         assert_eq!(beat(30, 1), Some(on(0)), "now both speak");
+    }
+
+    /// Somebody who sends back what he hears is no second station.
+    #[test]
+    fn an_echo_is_no_station() {
+        let mut stations = Stations::default();
+        let on = |channel| ChannelId::new(channel).expect("below the bound");
+        for second in 0..10 {
+            for channel in [0, 1] {
+                let heard = stations.handle_heartbeat(Timestamp::from_secs(second), STATION, on(channel), second as u8);
+                assert_eq!(heard, None);
+            }
+        }
     }
 }

@@ -17,4 +17,5 @@ mod routing;
 mod shipped_files;
 mod structure;
 mod support;
+mod topologies;
 mod whole_path;

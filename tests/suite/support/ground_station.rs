@@ -100,6 +100,12 @@ impl GroundStation {
         self.say(&command_long(MavId::new(system, manager), 1001, &params));
     }
 
+    /// Gives control of a gimbal back.
+    pub fn release(&mut self, (system, manager, device): (u8, u8, u8)) {
+        let params = [-3.0, -3.0, -1.0, -1.0, NAN, NAN, f32::from(device)];
+        self.say(&command_long(MavId::new(system, manager), 1001, &params));
+    }
+
     /// Turns a gimbal to a pitch, in degrees.
     pub fn tilt(&mut self, (system, manager, device): (u8, u8, u8), pitch: f32) {
         let params = [pitch, 0.0, NAN, NAN, 44.0, 0.0, f32::from(device)];

@@ -11,12 +11,18 @@ use gimbald::timestamp::Timestamp;
 /// whatever it hears, a ground station on that autopilot's radio.
 pub struct Hub {
     members: Vec<Box<dyn Peer>>,
+    echoes: bool,
     outgoing: VecDeque<Vec<u8>>,
 }
 
 impl Hub {
     pub fn new(members: Vec<Box<dyn Peer>>) -> Self {
-        Self { members, outgoing: VecDeque::new() }
+        Self { members, echoes: false, outgoing: VecDeque::new() }
+    }
+
+    /// One that sends back whatever it hears from the daemon.
+    pub fn echoing(members: Vec<Box<dyn Peer>>) -> Self {
+        Self { echoes: true, ..Self::new(members) }
     }
 
     /// Lets everybody hear what somebody said, until nobody says anything more.
@@ -41,6 +47,9 @@ impl Hub {
 
 impl Peer for Hub {
     fn handle_received(&mut self, now: Timestamp, bytes: &[u8]) {
+        if self.echoes {
+            self.outgoing.push_back(bytes.to_vec());
+        }
         for member in &mut self.members {
             member.handle_received(now, bytes);
         }
