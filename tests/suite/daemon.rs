@@ -7,6 +7,7 @@ mod garbage;
 mod load;
 mod ports;
 mod reports;
+mod restart;
 mod unplugged;
 
 use gimbald::gimbals::mavlink_v2::sim::{Device, DeviceSettings};

@@ -13,6 +13,7 @@ mod gimbal_manager_document;
 mod gimbald;
 mod pacing;
 mod properties;
+mod restart;
 mod routing;
 mod shipped_files;
 mod structure;
