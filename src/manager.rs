@@ -269,6 +269,10 @@ impl GimbalManager {
                     voice.handle_status(status);
                 }
                 self.status = Some((now, status));
+                if let (Some(_), Some(capabilities)) = (status.heading, self.capabilities) {
+                    let situation = self.situation(now, &capabilities, around);
+                    self.tracking.handle_turned(now, &situation);
+                }
             }
             Report::Malformed { reason } => {
                 if let Some(device) = self.device {

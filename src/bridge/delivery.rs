@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::conflicts::Conflict;
-use super::roster::Place;
+use super::roster::{Gimbal, Place};
 use super::settings::Role;
 use super::{Bridge, KnownVehicle, LinkIndex, surroundings};
 use crate::channel::{ChannelId, ChannelSet};
@@ -183,7 +183,11 @@ impl Bridge {
         let other_vehicle = self.is_other_vehicle(now, sender.id);
         let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
         let around = Surroundings { overheard, other_vehicle, ..around };
-        for gimbal in self.roster.iter_mut().filter(|gimbal| for_us(gimbal.component)) {
+        // Who has no gimbal yet says so to who asks it, and to everybody only while nobody here has one.
+        let exactly_one = matches!(target, Target::Component(_)) && !overheard;
+        let some_have = self.roster.iter().any(|gimbal| gimbal.manager.device().is_some());
+        let has_a_say = |gimbal: &Gimbal| exactly_one || !some_have || gimbal.manager.device().is_some();
+        for gimbal in self.roster.iter_mut().filter(|gimbal| for_us(gimbal.component) && has_a_say(gimbal)) {
             match &request {
                 Ok(request) => gimbal.manager.handle_request(now, sender, request, around),
                 Err(refusal) => gimbal.manager.count_refusal(sender.id, refusal.reason),
@@ -192,7 +196,7 @@ impl Bridge {
     }
 
     /// Whether we are to act on a command to the autopilot that passes through us (`snoop_autopilot`). One that we do not
-    /// forward to it is none of our business, and what the autopilot's own id says is not said to it.
+    /// forward to it is none of our business, as is all that is said where it is itself.
     fn is_overheard(&mut self, now: Timestamp, from: ChannelId, frame: &Frame<'_>) -> bool {
         const WORTH_HEARING: [u16; 7] = [
             command::DO_SET_ROI_LOCATION,
@@ -206,7 +210,6 @@ impl Bridge {
         let Target::Component(target) = frame.target() else { return false };
         self.settings.control.snoop_autopilot
             && self.autopilot == Some(target)
-            && frame.source() != target
             && command_number(frame).is_some_and(|number| WORTH_HEARING.contains(&number))
             && !self.router.route(now, from, frame.source(), frame.target()).channels.is_empty()
     }

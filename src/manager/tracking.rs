@@ -52,6 +52,8 @@ pub struct Tracking {
     /// What the holder of secondary control adds.
     nudge: Nudge,
     last_at: Timestamp,
+    /// The vehicle's heading with which it was reckoned.
+    last_heading: Option<Angle>,
     /// What the aim takes is not known at present, so the last setpoint is held.
     stale: bool,
     /// When radio control was last asked to let go of the gimbal.
@@ -81,6 +83,7 @@ impl Tracking {
             timed_out: None,
             nudge: Nudge::default(),
             last_at: Timestamp::ZERO,
+            last_heading: None,
             stale: false,
             let_go: None,
         }
@@ -193,14 +196,16 @@ impl Tracking {
         self.nudge = Nudge::default();
     }
 
-    /// The vehicle has turned: where the setpoint follows it, the next one is due unless one has just been sent.
+    /// More is known of how the vehicle is turned: where the setpoint follows it, the next one is due unless one has just
+    /// been sent.
     pub fn handle_turned(&mut self, now: Timestamp, situation: &Situation<'_>) {
         let follows = match &self.aim {
             Aim::Roi(_) => situation.device_frame(YawFrame::Earth) != YawFrame::Earth,
             Aim::Point(point) => situation.device_frame(point.frame) != point.frame,
             Aim::Idle | Aim::Retract | Aim::Neutral | Aim::Turn(_) => false,
         };
-        if follows && now.since(self.last_at) >= self.period * 4 / 5 {
+        let turned = situation.heading.is_some() && situation.heading != self.last_heading;
+        if follows && turned && now.since(self.last_at) >= self.period * 4 / 5 {
             self.next = Some(now);
         }
     }
@@ -225,6 +230,7 @@ impl Tracking {
         self.note_stale(wanted.is_none() || self.has_lost_the_vehicle(situation));
         self.last = wanted.or(self.last);
         self.last_at = now;
+        self.last_heading = situation.heading;
         self.next = (self.aim != Aim::Idle).then(|| now + self.period);
         self.last
     }

@@ -134,6 +134,26 @@ fn client_item_e80_a_change_of_lock_moves_nothing() {
     }
 }
 
+/// A-12 once more: unlocked behind the end stop, the camera keeps the direction in which it looks, not the one it was told to.
+#[test]
+fn client_item_e80_what_is_kept_is_what_the_picture_shows() {
+    let side = 2.0_f64.to_degrees();
+    let (mut world, places) = with_gimbal();
+    turn_vehicle(&mut world, places, 30.0);
+    look(&mut world, places, -20.0, 100.0);
+    for (command, yaw) in [
+        (pitchyaw(-20.0, 179.0, NAN, NAN, 92.0), side),
+        (pitchyaw(NAN, NAN, NAN, NAN, 0.0), side),
+        (pitchyaw(NAN, NAN, NAN, NAN, 16.0), side),
+    ] {
+        assert_eq!(world.result_of(places.ground, GCS, &command), Some(ACCEPTED));
+        assert_eq!(looks(&mut world, places), (-20.0, round(yaw)), "{command:?}");
+    }
+    turn_vehicle(&mut world, places, 50.0);
+    run_looking(&mut world, places, SECOND / 10, -20.0, side);
+    assert_eq!(looks(&mut world, places), (-20.0, round(side - 20.0)));
+}
+
 /// Client checklist E81: "1000 with flags 1 retracts; with flags 0 and angles goes back to work; flags 2 goes to neutral, angles
 /// ignored." Client checklist E82: "1000 with one axis NaN leaves this axis alone."
 #[test]

@@ -200,6 +200,36 @@ fn client_item_e86_each_manager_answers_for_its_own_gimbal() {
     }
 }
 
+/// Who has no gimbal yet says so to who asks it, and to everybody only while nobody here has one: a client would take its
+/// refusal for the answer.
+#[test]
+fn a_manager_without_a_gimbal_is_silent_among_others() {
+    let second = MavId::new(1, 171);
+    let (mut world, places) = World::empty(three_links());
+    let requests = [
+        request_message(MavId::new(0, 0), 280),
+        command_long(MavId::new(1, 0), 1000, &[-10.0, 0.0, NAN, NAN, 44.0, NAN, 0.0]),
+        command_long(MavId::new(1, 0), 197, &[]),
+    ];
+    for request in &requests {
+        let answers = world.ask(places.ground, GCS, request);
+        let acks = answers.iter().filter(|answer| answer.id() == 77);
+        let acks: Vec<(u8, u8)> =
+            acks.map(|ack| (ack.source().component, ack.decode::<COMMAND_ACK_DATA>().result)).collect();
+        assert_eq!(acks, [(191, TEMPORARILY_REJECTED)], "{request:?}");
+    }
+    world.send(places.gimbal, second, &gimbal_heartbeat());
+    let information = device_information(world.now, usual_capabilities());
+    world.send(places.gimbal, second, &MavMessage::GIMBAL_DEVICE_INFORMATION(information));
+    for request in requests {
+        let answers = world.ask(places.ground, GCS, &request);
+        assert!(answers.iter().all(|answer| answer.source().component == 192), "{request:?}");
+        assert_eq!(of::<COMMAND_ACK_DATA>(&answers).len(), 1);
+        let to_the_other = world.result_of(places.ground, GCS, &to(MANAGER, request));
+        assert_eq!(to_the_other, Some(TEMPORARILY_REJECTED), "who is asked answers");
+    }
+}
+
 /// "command TEMPORARILY_REJECTED" while there is no device, also for an id: the gimbal may be that one when it comes.
 #[test]
 fn without_a_gimbal_commands_are_to_come_again() {

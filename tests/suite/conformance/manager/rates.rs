@@ -287,6 +287,29 @@ fn item_113_the_way_round_is_the_short_one_or_the_one_without_an_end_stop() {
     }
 }
 
+/// Without a heading it is the short way, on a gimbal that takes its yaw from North.
+#[test]
+fn item_113_without_a_heading_the_way_round_is_the_short_one() {
+    let (mut world, places) = with_gimbal();
+    let status = |world: &World| {
+        let status = device_status(world.now, 44 | 64 | 128, 0.0, 170.0);
+        MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(GIMBAL_DEVICE_ATTITUDE_STATUS_DATA { flags: 92 | 128, ..status })
+    };
+    world.send(places.gimbal, GIMBAL, &status(&world));
+    assert_eq!(world.result_of(places.ground, GCS, &pitchyaw(0.0, -170.0, NAN, 40.0, 92.0)), Some(ACCEPTED));
+    let mut yaw = 170.0;
+    for _ in 0..10 {
+        world.send(places.gimbal, GIMBAL, &status(&world));
+        world.run_for(SECOND / 10);
+        for (_, setpoint) in setpoints(&mut world, places) {
+            let step = (pitch_yaw_deg(setpoint.q).1 - yaw + 540.0).rem_euclid(360.0) - 180.0;
+            assert!((-1e-3..2.01).contains(&step), "{step}");
+            yaw += step;
+        }
+    }
+    assert_near(yaw, 190.0, 0.01);
+}
+
 /// Client checklist E101, by the letter of MAVProxy's `gimbal rate`, to the device id 0 and without flags, and stopped by its
 /// next angle, a mount command.
 #[test]

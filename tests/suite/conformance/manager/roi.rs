@@ -5,7 +5,7 @@ use std::time::Duration;
 use gimbald::bridge::settings::Settings;
 use gimbald::manager::settings::{AltitudeReference, ControlSettings};
 use gimbald::wire::MavId;
-use gimbald::wire::dialect::MavMessage;
+use gimbald::wire::dialect::{ATTITUDE_DATA, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, MavMessage};
 use gimbald::wire::ids::CapFlags;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -231,6 +231,47 @@ fn item_121_the_gimbal_follows_as_the_vehicle_moves_and_turns() {
     world.forget();
     fly(&mut world, places, FIELD, 90.0);
     assert_eq!(setpoints(&mut world, places).len(), 1, "at once, and only once");
+}
+
+/// Only news of the heading makes a setpoint at once: an attitude that is trusted less, or the same again, does not use up the
+/// moment of the one that counts. Where the gimbal tells the heading itself, its word counts.
+#[test]
+fn item_121_what_tells_the_heading_is_what_is_followed() {
+    let (mut world, places) = with_gimbal_that(endless_yaw(), three_links());
+    look(&mut world, places, 0.0, 0.0);
+    fly(&mut world, places, FIELD, 0.0);
+    assert_eq!(world.result_of(places.ground, GCS, &roi_location(0, BELOW, 388.0)), Some(ACCEPTED));
+    world.forget();
+    let attitude = |yaw: f32| {
+        MavMessage::ATTITUDE(ATTITUDE_DATA {
+            time_boot_ms: 0,
+            roll: 0.0,
+            pitch: 0.0,
+            yaw,
+            rollspeed: 0.0,
+            pitchspeed: 0.0,
+            yawspeed: 0.0,
+        })
+    };
+    world.run_for(Duration::from_millis(45));
+    world.send(places.autopilot, AUTOPILOT, &attitude(1.0));
+    turn_vehicle(&mut world, places, 0.0);
+    assert_eq!(setpoints(&mut world, places), []);
+    turn_vehicle(&mut world, places, 3.0);
+    assert_eq!(setpoints(&mut world, places).len(), 1);
+    for heading in [10.0_f32, 20.0] {
+        world.run_for(Duration::from_millis(45));
+        world.forget();
+        let status = GIMBAL_DEVICE_ATTITUDE_STATUS_DATA {
+            delta_yaw: heading.to_radians(),
+            ..device_status(world.now, 44, 0.0, 0.0)
+        };
+        world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status));
+        let told = only_setpoint(&mut world, places);
+        assert_near(pitch_yaw_deg(told.q).1, 34.176 - f64::from(heading), 0.001);
+        turn_vehicle(&mut world, places, 50.0);
+        assert_eq!(setpoints(&mut world, places), []);
+    }
 }
 
 /// "When 197 arrives, ROI stops; if the primary streams 287, its set-point applies, else NEUTRAL."
