@@ -262,8 +262,8 @@ impl GimbalManager {
                 }
             }
             Report::Attitude(status) => {
-                if let (Some(of_gimbal), Some(of_vehicle)) = (status.heading, around.vehicle.heading(now)) {
-                    self.heading_bias.handle_headings(now, of_gimbal, of_vehicle);
+                if let Some(of_gimbal) = status.heading {
+                    self.heading_bias.handle_heading(now, of_gimbal, around.vehicle.heading(now));
                 }
                 if let Some(voice) = &mut self.voice {
                     voice.handle_status(status);
@@ -531,10 +531,9 @@ impl GimbalManager {
 
     fn situation<'a>(&self, now: Timestamp, capabilities: &'a Capabilities, around: Surroundings<'_>) -> Situation<'a> {
         let status = self.status.filter(|(at, _)| now.since(*at) <= ATTITUDE_STALE).map(|(_, status)| status);
-        let of_vehicle = || around.vehicle.heading(now).map(|heading| self.heading_bias.applied_to(heading));
         Situation {
             measured: status,
-            heading: status.and_then(|status| status.heading).or_else(of_vehicle),
+            heading: self.heading_bias.heading(status.and_then(|status| status.heading), around.vehicle.heading(now)),
             position: around.vehicle.position(now),
             capabilities,
             accepts_earth_yaw: self.status.is_some_and(|(_, status)| status.accepts_earth_yaw),

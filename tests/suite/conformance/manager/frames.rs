@@ -180,6 +180,68 @@ fn items_109_and_110_north_is_held_by_the_device_or_by_us() {
     }
 }
 
+/// Protocol checklist 110 again, and A-06 ("delta_yaw if trusted, else ψ"): a gimbal that tells its own heading, which is
+/// 15° more than the autopilot's, four times a second. In between the autopilot tells how the vehicle turns, and the
+/// gimbal is kept on its direction all the same.
+#[test]
+fn item_110_a_gimbal_that_tells_its_heading_seldom_is_turned_back_in_between() {
+    let (mut world, places) = with_gimbal();
+    let heading_deg = |world: &World| 40.0 * (world.now.as_secs_f64() - 1.0);
+    let look = |world: &mut World| {
+        let delta_yaw = ((heading_deg(world) + 15.0).to_radians()) as f32;
+        let status = device_status(world.now, 44, 0.0, 0.0);
+        let status = GIMBAL_DEVICE_ATTITUDE_STATUS_DATA { delta_yaw, ..status };
+        world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status));
+    };
+    world.run_for(SECOND - (world.now - gimbald::timestamp::Timestamp::ZERO));
+    turn_vehicle(&mut world, places, 0.0);
+    look(&mut world);
+    assert_eq!(world.result_of(places.ground, GCS, &pitchyaw(0.0, 90.0, NAN, NAN, 92.0)), Some(ACCEPTED));
+    world.forget();
+    let mut told = 0;
+    for step in 1..=100 {
+        world.run_for(Duration::from_millis(20));
+        let heading = heading_deg(&world);
+        turn_vehicle(&mut world, places, heading);
+        if step % 13 == 0 {
+            look(&mut world);
+        }
+        for (_, setpoint) in setpoints(&mut world, places) {
+            assert_eq!(setpoint.flags, 44);
+            // By the heading told last, or by the one 20 ms before it.
+            assert_near(pitch_yaw_deg(setpoint.q).1, 90.0 - 15.0 - heading + 0.4, 0.41);
+            told += 1;
+        }
+    }
+    assert!(told >= 40, "{told}");
+}
+
+/// A-06 once more: the gimbal's heading counts also where the autopilot's is not known, and the autopilot's when it comes
+/// turns nothing before the two have been compared.
+#[test]
+fn item_110_the_heading_of_the_autopilot_alone_moves_no_camera() {
+    let (mut world, places) = with_gimbal();
+    let look = |world: &mut World| {
+        let status = device_status(world.now, 44, 0.0, 0.0);
+        let status = GIMBAL_DEVICE_ATTITUDE_STATUS_DATA { delta_yaw: 15_f32.to_radians(), ..status };
+        world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status));
+    };
+    let next_yaw_deg = |world: &mut World| {
+        world.forget();
+        world.run_for(Duration::from_millis(50));
+        let told = setpoints(world, places);
+        pitch_yaw_deg(told.last().expect("it is streamed").1.q).1
+    };
+    look(&mut world);
+    assert_eq!(world.result_of(places.ground, GCS, &pitchyaw(0.0, 90.0, NAN, NAN, 92.0)), Some(ACCEPTED));
+    assert_near(next_yaw_deg(&mut world), 75.0, 0.001);
+    turn_vehicle(&mut world, places, 0.0);
+    assert_near(next_yaw_deg(&mut world), 75.0, 0.001);
+    look(&mut world);
+    turn_vehicle(&mut world, places, 10.0);
+    assert_near(next_yaw_deg(&mut world), 65.0, 0.001);
+}
+
 /// "When heading is unknown or stale (> 1 s) and conversion is needed, 1000 → TEMPORARILY_REJECTED."
 #[test]
 fn item_111_without_a_heading_north_cannot_be_held() {
