@@ -4,6 +4,7 @@
 
 mod motion;
 mod nudge;
+mod radio_control;
 mod reading;
 mod roi;
 mod situation;
@@ -14,7 +15,7 @@ use super::request::{Demand, Refusal};
 use crate::geometry::{Angle, Position, Yaw, YawFrame};
 use crate::gimbals::adapt;
 use crate::gimbals::capabilities::Capabilities;
-use crate::gimbals::setpoint::{Pointing, RadioControl, Setpoint, Stabilised};
+use crate::gimbals::setpoint::{Pointing, Setpoint, Stabilised};
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 use crate::wire::ids::CapFlags;
@@ -24,9 +25,6 @@ use nudge::Nudge;
 use roi::Roi;
 use situation::Pose;
 pub use situation::Situation;
-
-/// So long after radio control was asked to let go of the gimbal, the gimbal may still say that it has it.
-const LETTING_GO: Duration = Duration::from_secs(1);
 
 /// How long rates last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -100,13 +98,7 @@ impl Tracking {
     ) -> Result<(), Refusal> {
         self.carry_on(now, situation);
         let Some(aim) = self.read_demand(now, demand, situation, timeouts)? else { return Ok(()) };
-        let hands_over = is_handed_over(&aim);
-        if self.is_radio_controlled(now, situation) && !hands_over && !is_handed_over(&self.aim) {
-            return Err(Refusal::later("radio_control_has_it"));
-        }
-        if is_handed_over(&self.aim) && !hands_over {
-            self.let_go = Some(now);
-        }
+        self.change_hands(now, &aim, situation)?;
         self.begin(now, source, aim);
         let whole = matches!(aim, Aim::Retract | Aim::Neutral);
         self.nudge.handle_absolute(now, whole || demand.pitch.angle.is_some(), whole || demand.yaw.angle.is_some());
@@ -125,10 +117,9 @@ impl Tracking {
             return Err(Refusal::later("no_vehicle_position"));
         }
         self.need_frame(YawFrame::Earth, situation)?;
-        if self.is_radio_controlled(now, situation) {
-            return Err(Refusal::later("radio_control_has_it"));
-        }
-        self.begin(now, source, Aim::Roi(Roi::new(place)));
+        let aim = Aim::Roi(Roi::new(place));
+        self.change_hands(now, &aim, situation)?;
+        self.begin(now, source, aim);
         self.nudge.handle_absolute(now, true, true);
         Ok(())
     }
@@ -217,7 +208,7 @@ impl Tracking {
         }
         self.carry_on(now, situation);
         if self.is_radio_controlled(now, situation) {
-            if is_handed_over(&self.aim) {
+            if self.is_handed_over() {
                 self.next = Some(now + self.period);
             } else {
                 // What was asked for before must not move the gimbal when its radio control lets go of it.
@@ -357,12 +348,6 @@ impl Tracking {
         }
     }
 
-    /// Whether the gimbal is in the hands of its radio control, apart from the time in which that lets go.
-    fn is_radio_controlled(&self, now: Timestamp, situation: &Situation<'_>) -> bool {
-        let letting_go = self.let_go.is_some_and(|at| now.since(at) < LETTING_GO);
-        situation.radio_control_has_it() && !letting_go
-    }
-
     /// The place is looked at from where the vehicle was.
     fn has_lost_the_vehicle(&self, situation: &Situation<'_>) -> bool {
         matches!(self.aim, Aim::Roi(_)) && situation.position.is_none()
@@ -408,11 +393,6 @@ impl Tracking {
         let frame = situation.device_frame(hold);
         adapt::to_device(setpoint, frame, situation.heading, &situation.capabilities.limits, yaw_now)
     }
-}
-
-/// Whether the gimbal is, or is to be, in the hands of its radio control because a client asked for that.
-fn is_handed_over(aim: &Aim) -> bool {
-    matches!(aim, Aim::Point(Point { radio_control: RadioControl::Exclusive, .. }))
 }
 
 fn neutral(capabilities: &Capabilities) -> Aim {

@@ -48,6 +48,19 @@ fn a_54_a_client_hands_the_gimbal_to_its_radio_control_and_takes_it_back() {
     assert!(told.iter().all(|(_, setpoint)| setpoint.flags == 44));
 }
 
+/// A place to look at takes it back as well.
+#[test]
+fn a_54_a_region_of_interest_takes_the_gimbal_back() {
+    let (mut world, places) = with_inputs();
+    report(&mut world, places, 0, 10.0);
+    assert_eq!(world.result_of(places.ground, GCS, &pitchyaw(-20.0, 30.0, NAN, NAN, 300.0)), Some(ACCEPTED));
+    run_with(&mut world, places, SECOND, EXCLUSIVE);
+    fly(&mut world, places, FIELD, 0.0);
+    world.forget();
+    assert_eq!(world.result_of(places.ground, GCS, &roi_location(0, [47.5, 8.5], 400.0)), Some(ACCEPTED));
+    assert_eq!(only_setpoint(&mut world, places).flags, 44);
+}
+
 /// When radio control has the gimbal without our doing, or does not let go of it, it is told nothing, and nothing that was asked
 /// for before moves it afterwards.
 #[test]
