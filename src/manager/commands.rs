@@ -7,7 +7,7 @@
 use std::time::Duration;
 
 use super::events::Event;
-use super::request::{Command, Configure, Refusal};
+use super::request::{Command, Configure, Demand, DemandKind, Refusal};
 use super::{GimbalManager, ManagerOutput, Sender, Surroundings, messages};
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
@@ -121,7 +121,10 @@ impl GimbalManager {
         }
         let voice = self.gate(now, sender, around)?;
         match command.number {
-            command::DO_GIMBAL_MANAGER_PITCHYAW => self.handle_demand(now, sender, &command.pitchyaw()?, around)?,
+            command::DO_GIMBAL_MANAGER_PITCHYAW => {
+                let kind = self.kind_of(now, sender, command);
+                self.handle_demand(now, sender, &Demand { kind, ..command.pitchyaw()? }, around)?;
+            }
             command::DO_MOUNT_CONFIGURE => self.do_mount_configure(now, sender, command, around)?,
             command::DO_MOUNT_CONTROL => self.do_mount_control(now, sender, command, around)?,
             // Places are the primary's, or nobody's.
@@ -146,6 +149,17 @@ impl GimbalManager {
             _ => return self.do_set_roi(now, sender, command, around),
         }
         Ok(Outcome::Accepted)
+    }
+
+    /// A rate that its sender says again before a streamed one would have ended is a stream, and ends like one: up to its
+    /// releases of early 2026 QGroundControl turns a gimbal by commands every 500 ms, and may fail to send the last, zero.
+    fn kind_of(&self, now: Timestamp, sender: MavId, command: &Command) -> DemandKind {
+        let again = self.last_command.is_some_and(|last| {
+            last.sender == sender
+                && now.since(last.at) <= self.rules.rate_timeout
+                && command.is_meant_again_after(&last.command)
+        });
+        if again { DemandKind::Streamed } else { DemandKind::Commanded }
     }
 
     /// Whether a command is for this gimbal: an id that nobody here has is refused to whoever asked exactly us, and

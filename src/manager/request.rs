@@ -261,10 +261,18 @@ impl Command {
 
     /// Whether it is `earlier` again, sent anew because its answer did not come.
     pub fn is_repeat_of(&self, earlier: &Self) -> bool {
+        self.confirmation > earlier.confirmation && self.says_what(earlier)
+    }
+
+    /// Whether it is `earlier` again, and meant again: not the first of its kind, and not for want of an answer. Of a
+    /// `COMMAND_INT`, which counts no confirmations, nobody can tell.
+    pub fn is_meant_again_after(&self, earlier: &Self) -> bool {
+        self.form == Form::Long && self.confirmation == 0 && self.says_what(earlier)
+    }
+
+    fn says_what(&self, other: &Self) -> bool {
         let bits = |command: &Self| command.params.map(f32::to_bits);
-        self.confirmation > earlier.confirmation
-            && (self.number, self.target, self.form) == (earlier.number, earlier.target, earlier.form)
-            && bits(self) == bits(earlier)
+        (self.number, self.target, self.form) == (other.number, other.target, other.form) && bits(self) == bits(other)
     }
 
     /// Refuses `x` and `y` that are no numbers.

@@ -60,23 +60,60 @@ fn client_item_e89_a_repeat_is_accepted_and_not_carried_out_again() {
 
 /// QGroundControl repeats a rate every 500 ms while a key is held, with confirmation 0: each is carried out, so that the
 /// rotation goes on. A repeat for want of an answer does not prolong it.
+///
+/// Client checklist E102: "Stream ends without a zero: rates stop within the dead-man time (≤ 3 s)." What is said again is a
+/// stream, also when it is said by commands. A `COMMAND_INT`, by which MAVSDK says a rate once, and again for want of an
+/// answer, counts no confirmations, so there a repeat is none.
 #[test]
-fn a_rate_that_is_meant_again_goes_on_and_a_repeat_does_not_prolong_it() {
-    // Every 500 ms for 4.5 s, or once again after 500 ms; a commanded rate lasts 10 s.
-    for (confirmation, times, check_at_ms, turns) in
-        [(0, 10, 14_000, true), (1, 2, 10_200, false), (0, 2, 10_200, true)]
-    {
+fn client_item_e102_a_rate_that_is_meant_again_is_a_stream_and_a_repeat_for_want_of_an_answer_is_none() {
+    let long = |confirmation| again(confirmation, pitchyaw(NAN, NAN, 0.0, 20.0, 12.0));
+    let int = |_| command_int(MANAGER, 1000, [NAN, NAN, 0.0, 20.0], 12, 0, 154.0);
+    let commands: [&dyn Fn(u8) -> MavMessage; 2] = [&long, &int];
+    // Which command, how many times and how far apart, and what turns how long after the last one. A rate that is said once
+    // lasts 10 s, a streamed one 2 s.
+    for (form, confirmation, times, apart_ms, after_ms, turns) in [
+        (0, 0, 10, 500, 1_800, true),
+        (0, 0, 10, 500, 2_300, false),
+        (0, 0, 2, 500, 1_800, true),
+        (0, 0, 2, 500, 2_300, false),
+        (0, 0, 2, 2_000, 2_300, false),
+        // Too far apart for a stream.
+        (0, 0, 2, 2_100, 9_800, true),
+        (0, 0, 2, 2_100, 10_300, false),
+        // For want of an answer, which is not carried out.
+        (0, 1, 2, 500, 9_300, true),
+        (0, 1, 2, 500, 9_800, false),
+        (1, 0, 4, 500, 9_800, true),
+        (1, 0, 4, 500, 10_300, false),
+    ] {
         let (mut world, places) = with_gimbal();
-        let started = world.now;
         for at in 0..times {
-            let confirmation = if at == 0 { 0 } else { confirmation };
-            let rate = again(confirmation, pitchyaw(NAN, NAN, 0.0, 20.0, 12.0));
+            if at > 0 {
+                run_looking(&mut world, places, Duration::from_millis(apart_ms), 0.0, 0.0);
+            }
+            let rate = commands[form](if at == 0 { 0 } else { confirmation });
             assert_eq!(world.result_of(places.ground, GCS, &rate), Some(ACCEPTED));
-            run_looking(&mut world, places, SECOND / 2, 0.0, 0.0);
         }
-        let rest = Duration::from_millis(check_at_ms) - (world.now - started);
-        run_looking(&mut world, places, rest, 0.0, 0.0);
-        assert_eq!(turning(&mut world, places), turns, "confirmation {confirmation}, {times} times");
+        run_looking(&mut world, places, Duration::from_millis(after_ms), 0.0, 0.0);
+        let said = format!("form {form}, confirmation {confirmation}, {times} times every {apart_ms} ms");
+        assert_eq!(turning(&mut world, places), turns, "{said}, {after_ms} ms after the last one");
+    }
+}
+
+/// Only the same rate again is a stream: who says another asks for that one, once.
+#[test]
+fn another_rate_is_no_stream() {
+    for (sender, second) in [
+        (GCS, pitchyaw(NAN, NAN, 0.0, 21.0, 12.0)),
+        (GCS, pitchyaw(NAN, NAN, 0.0, 20.0, 44.0)),
+        (COMPANION, pitchyaw(NAN, NAN, 0.0, 20.0, 12.0)),
+    ] {
+        let (mut world, places) = with_gimbal();
+        assert_eq!(world.result_of(places.ground, GCS, &pitchyaw(NAN, NAN, 0.0, 20.0, 12.0)), Some(ACCEPTED));
+        run_looking(&mut world, places, SECOND / 2, 0.0, 0.0);
+        assert_eq!(world.result_of(places.ground, sender, &second), Some(ACCEPTED));
+        run_looking(&mut world, places, Duration::from_millis(9_800), 0.0, 0.0);
+        assert!(turning(&mut world, places), "{sender} {second:?}");
     }
 }
 
