@@ -13,6 +13,7 @@ mod control_war;
 mod events;
 mod frames;
 mod mount;
+mod outcomes;
 mod presence;
 mod radio_control;
 mod rates;
