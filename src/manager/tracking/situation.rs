@@ -39,9 +39,11 @@ impl Situation<'_> {
 
     /// Where the gimbal looks now, yaw in `frame`.
     pub(super) fn measured_pose(&self, frame: YawFrame) -> Option<Pose> {
-        let attitude = self.measured?.attitude;
-        let angles = attitude.angles();
-        let yaw = attitude.yaw().in_frame(frame, self.heading)?.angle();
+        let status = self.measured?;
+        let angles = status.attitude.angles();
+        // A gimbal that holds no direction over ground has turned with the vehicle since it said where it looks.
+        let turned = if status.flags.contains(GimbalFlags::YAW_LOCK) { None } else { status.heading };
+        let yaw = status.attitude.yaw().in_frame(frame, turned.or(self.heading))?.angle();
         Some(Pose { roll: angles.roll, pitch: angles.pitch, yaw })
     }
 }
