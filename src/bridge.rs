@@ -19,6 +19,7 @@ mod own_commands;
 pub mod pacing;
 mod picture;
 mod rates;
+mod rivals;
 mod roster;
 mod sent;
 pub mod settings;
@@ -44,6 +45,7 @@ use conflicts::Conflicts;
 use events::Events;
 use identity::{Identity, Ties};
 use outbox::Outbox;
+use rivals::RivalWatch;
 use roster::{GimbalOutput, Roster};
 use settings::{Role, Settings};
 use state_for_gimbals::StateForGimbals;
@@ -122,6 +124,7 @@ pub struct Bridge {
     events: Events,
     announcements: Announcements,
     stations: Stations,
+    watch: RivalWatch,
     outbox: Outbox,
     buffer: FrameBuffer,
     timers: TimerTable<Timer>,
@@ -164,6 +167,7 @@ impl Bridge {
             announcements: Announcements::default(),
             conflicts: Conflicts::new(settings.links.iter().map(|link| link.name.clone()).collect()),
             stations: Stations::default(),
+            watch: RivalWatch::default(),
             outbox: Outbox::default(),
             buffer: FrameBuffer::default(),
             timers: TimerTable::default(),

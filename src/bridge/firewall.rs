@@ -41,6 +41,10 @@ impl Bridge {
                     return ChannelSet::EMPTY;
                 }
                 self.note_rival_manager(now, frame);
+                if self.is_answer_to_our_watch(now, frame) {
+                    self.count_dropped(place.link, "answer_to_us");
+                    return ChannelSet::EMPTY;
+                }
                 channels
             }
             message::GIMBAL_DEVICE_INFORMATION | message::GIMBAL_DEVICE_ATTITUDE_STATUS => {

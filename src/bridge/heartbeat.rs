@@ -33,6 +33,7 @@ impl Bridge {
         self.compare_headings(now);
         self.look_for_renamed(now);
         self.remind_devices(now);
+        self.watch_for_rivals(now);
         self.look_after_streams(now);
         for at in 0..self.roster.len() {
             self.announce_state(now, at);

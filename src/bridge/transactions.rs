@@ -36,6 +36,8 @@ pub enum Asker {
     Streams { message_id: u32 },
     /// The driver of the gimbal whose manager sends it.
     Driver,
+    /// Whoever looks for another manager; what it wants to know comes as a message.
+    RivalWatch,
 }
 
 /// A command to one component.

@@ -1,5 +1,6 @@
 //! What holds for any input.
 
+mod adoption;
 mod manager;
 mod routing;
 mod wire;

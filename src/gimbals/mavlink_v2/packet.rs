@@ -154,6 +154,11 @@ pub fn request_message(target: Target, message_id: u32) -> MavMessage {
     MavMessage::COMMAND_LONG(command_long(target, command::REQUEST_MESSAGE, [message_id as f32, 0.0]))
 }
 
+/// The same to one component, which is to answer.
+pub fn request_of(target: MavId, message_id: u32) -> COMMAND_LONG_DATA {
+    command_long(Target::Component(target), command::REQUEST_MESSAGE, [message_id as f32, 0.0])
+}
+
 /// `SET_MESSAGE_INTERVAL` for `message_id`.
 pub fn set_message_interval(target: MavId, message_id: u32, interval: Duration) -> COMMAND_LONG_DATA {
     let params = [message_id as f32, interval.as_micros() as f32];

@@ -6,7 +6,7 @@ use gimbald::bridge::settings::{LinkSettings, Role, Settings, Transport};
 use gimbald::gimbals::settings::GimbalSettings;
 use gimbald::wire::MavId;
 use gimbald::wire::dialect::{
-    COMMAND_ACK_DATA, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA,
+    COMMAND_ACK_DATA, COMMAND_LONG_DATA, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA,
     GIMBAL_DEVICE_SET_ATTITUDE_DATA, GIMBAL_MANAGER_INFORMATION_DATA, GIMBAL_MANAGER_SET_PITCHYAW_DATA,
     GIMBAL_MANAGER_STATUS_DATA, HEARTBEAT_DATA, MavMessage,
 };
@@ -165,6 +165,46 @@ fn item_26_a_gimbal_that_comes_after_ninety_seconds_is_found() {
     let heard = rig.world.take(rig.ground);
     assert_eq!(of::<GIMBAL_MANAGER_INFORMATION_DATA>(&heard).len(), 1);
     assert_eq!(rig.managed(), [(191, "1/154".to_owned())]);
+}
+
+/// Protocol checklist 34 and 35, client checklist E124: a gimbal that falls silent on a line that stays up is lost, which
+/// the heartbeat, 281 and the answers tell; its manager goes on answering. When it speaks again it is asked who it is, can
+/// be used, and is not moved before somebody wants it.
+#[test]
+fn items_34_and_35_a_gimbal_lost_on_a_line_that_is_up_recovers() {
+    let mut rig = Rig::new(three_links());
+    rig.introduce(rig.gimbals, GIMBAL);
+    let status = GIMBAL_DEVICE_ATTITUDE_STATUS_DATA { flags: 44, ..device_status(rig.world.now, 44, 0.0, 0.0) };
+    rig.world.send(rig.gimbals, GIMBAL, &MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status));
+    rig.steer_down(MANAGER);
+    rig.speak_for(SECOND, &[(rig.gimbals, GIMBAL)]);
+    let flags = |rig: &mut Rig| -> Vec<u32> {
+        rig.world.take_messages::<GIMBAL_MANAGER_STATUS_DATA>(rig.ground).iter().map(|told| told.flags).collect()
+    };
+    assert!(flags(&mut rig).ends_with(&[44]));
+
+    rig.world.run_for(4 * SECOND);
+    assert!(flags(&mut rig).ends_with(&[0]), "no state of a gimbal that is not there");
+    rig.world.run_for(SECOND);
+    assert_eq!(rig.states(), [(191, 5)]);
+    assert_eq!(rig.world.snapshot().links[1].state, "up");
+    let down = command_long(MANAGER, 1000, &[-45.0, 0.0, NAN, NAN, 44.0, 0.0, 0.0]);
+    assert_eq!(rig.world.result_of(rig.ground, GCS, &down), Some(FAILED));
+    let take = command_long(MANAGER, 1001, &[255.0, 190.0, -1.0, -1.0, NAN, NAN, 154.0]);
+    assert_eq!(rig.world.result_of(rig.ground, GCS, &take), Some(ACCEPTED), "ownership works");
+    let heard = rig.world.ask(rig.ground, GCS, &request_message(MANAGER, 280));
+    assert_eq!(of::<GIMBAL_MANAGER_INFORMATION_DATA>(&heard).len(), 1);
+
+    rig.world.forget();
+    rig.world.send(rig.gimbals, GIMBAL, &gimbal_heartbeat());
+    let asked: Vec<COMMAND_LONG_DATA> = rig.world.take_messages(rig.gimbals);
+    assert_eq!(asked.iter().map(|asked| (asked.command, asked.param1)).collect::<Vec<_>>(), [(512, 283.0)]);
+    rig.introduce(rig.gimbals, GIMBAL);
+    rig.speak_for(2 * SECOND, &[(rig.gimbals, GIMBAL)]);
+    assert_eq!(rig.steered(rig.gimbals), [0; 0]);
+    assert_eq!(rig.states().last(), Some(&(191, 4)));
+    assert_eq!(rig.world.result_of(rig.ground, GCS, &down), Some(ACCEPTED));
+    assert_eq!(rig.steered(rig.gimbals), [154]);
 }
 
 /// A device that is given another component id is the gimbal of the entry that names none: its manager stays, and
@@ -466,6 +506,7 @@ fn item_32_a_component_with_a_gimbal_of_its_own_is_left_to_itself() {
 }
 
 const ACK: u32 = 77;
+const FAILED: u8 = 4;
 const COMMAND_LONG: u32 = 76;
 
 /// [`three_links`] and a fourth to something else, `payload`.

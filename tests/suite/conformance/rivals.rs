@@ -7,13 +7,13 @@ use gimbald::bridge::settings::{Role, Settings, SystemId, Transport};
 use gimbald::manager::settings::{ControlSettings, Firewall};
 use gimbald::wire::MavId;
 use gimbald::wire::dialect::{
-    ATTITUDE_DATA, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA,
+    ATTITUDE_DATA, COMMAND_LONG_DATA, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA,
     GIMBAL_MANAGER_INFORMATION_DATA, GIMBAL_MANAGER_STATUS_DATA, MavMessage,
 };
 
 use crate::support::script::{
-    ACCEPTED, NAN, command_long, device_information, device_status, gimbal_heartbeat, ground_heartbeat, of, pitchyaw,
-    px4_heartbeat, quaternion, set_interval, take_control, usual_capabilities,
+    ACCEPTED, NAN, ack, command_long, device_information, device_status, gimbal_heartbeat, ground_heartbeat, of,
+    pitchyaw, px4_heartbeat, quaternion, set_interval, take_control, usual_capabilities,
 };
 use crate::support::world::{AUTOPILOT, GCS, GIMBAL, MANAGER, Place, Places, World, heartbeat, link, three_links};
 
@@ -146,6 +146,56 @@ fn a43_the_manager_of_an_autopilot_is_named_with_its_setting() {
         world.run_with(31 * SECOND, &[(SECOND, places.autopilot, AUTOPILOT, autopilot.clone())]);
         assert_eq!(world.snapshot().conflicts, [""; 0]);
     }
+}
+
+/// ArduPilot says nothing of its mounts unasked ("280, 281 and its own 285 are never streamed"), and a gimbal behind it
+/// it steers past us: it is asked. The answer is ours, and clients see it only when they ask themselves.
+#[test]
+fn a43_an_autopilot_that_manages_the_gimbal_behind_it_is_found() {
+    let ardupilot = heartbeat(2, 3);
+    for (behind, asked) in [(true, 3), (false, 0)] {
+        let (mut world, places) = World::empty(three_links());
+        world.send(places.autopilot, AUTOPILOT, &ardupilot);
+        introduce(&mut world, if behind { places.autopilot } else { places.gimbal }, GIMBAL);
+        let mut requests = 0;
+        for _ in 0..590 {
+            world.run_with(
+                SECOND / 10,
+                &[
+                    (SECOND, places.autopilot, AUTOPILOT, ardupilot.clone()),
+                    (SECOND, if behind { places.autopilot } else { places.gimbal }, GIMBAL, gimbal_heartbeat()),
+                ],
+            );
+            let to_autopilot: Vec<COMMAND_LONG_DATA> = world.take_messages(places.autopilot);
+            world.forget();
+            for request in to_autopilot {
+                if (request.command, request.param1, request.target_component) != (512, 280.0, 1) {
+                    continue;
+                }
+                requests += 1;
+                world.send(places.autopilot, AUTOPILOT, &MavMessage::COMMAND_ACK(ack(MANAGER, 512, ACCEPTED)));
+                let ours = world.send(places.autopilot, AUTOPILOT, &information_of(1));
+                assert!(world.take(places.ground).iter().all(|arrival| arrival.bytes != ours));
+                let theirs = world.send(places.autopilot, AUTOPILOT, &information_of(1));
+                assert!(world.take(places.ground).iter().any(|arrival| arrival.bytes == theirs));
+            }
+        }
+        assert_eq!(requests, asked, "behind the autopilot: {behind}");
+        let conflicts = world.snapshot().conflicts;
+        assert_eq!(conflicts.len(), usize::from(behind), "{conflicts:?}");
+        assert!(conflicts.iter().all(|text| text.contains("MNT1_TYPE")));
+    }
+}
+
+/// An autopilot on another system id than the configuration names is not ours, and the user is told which to set.
+#[test]
+fn a57_an_autopilot_on_another_system_id_than_configured_is_told() {
+    let (mut world, places) = World::empty(Settings { system_id: SystemId::Fixed(42), ..three_links() });
+    world.run_with(5 * SECOND, &[(SECOND, places.autopilot, MavId::new(7, 1), px4_heartbeat())]);
+    let snapshot = world.snapshot();
+    assert_eq!((snapshot.system_id, snapshot.vehicle.system_id), (Some(42), None));
+    let told = &snapshot.conflicts;
+    assert!(told.len() == 1 && told[0].contains("sends as 7/1") && told[0].contains("\"auto\" or to 7"), "{told:?}");
 }
 
 /// Another companion that manages our gimbal is named; one that manages another is none of our business, and what both
