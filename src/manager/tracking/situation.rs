@@ -38,12 +38,17 @@ impl Situation<'_> {
     }
 
     /// Where the gimbal looks now, yaw in `frame`.
+    ///
+    /// The vehicle may have turned since the gimbal told it. A yaw that is locked to North has stayed as it was over
+    /// ground, any other from the nose, in whichever frame it was told.
     pub(super) fn measured_pose(&self, frame: YawFrame) -> Option<Pose> {
         let status = self.measured?;
         let angles = status.attitude.angles();
-        // A gimbal that holds no direction over ground has turned with the vehicle since it said where it looks.
-        let turned = if status.flags.contains(GimbalFlags::YAW_LOCK) { None } else { status.heading };
-        let yaw = status.attitude.yaw().in_frame(frame, turned.or(self.heading))?.angle();
+        let locked = status.flags.contains(GimbalFlags::YAW_LOCK);
+        let kept_in = if locked { YawFrame::Earth } else { YawFrame::Vehicle };
+        let kept = status.attitude.yaw().in_frame(kept_in, status.heading.or(self.heading));
+        // Without a heading it can be told only as it came.
+        let yaw = kept.unwrap_or(status.attitude.yaw()).in_frame(frame, self.heading)?.angle();
         Some(Pose { roll: angles.roll, pitch: angles.pitch, yaw })
     }
 }

@@ -1,7 +1,7 @@
 //! Angles as real clients send them (client checklist E4).
 
 use gimbald::wire::MavId;
-use gimbald::wire::dialect::MavMessage;
+use gimbald::wire::dialect::{GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, MavMessage};
 use gimbald::wire::ids::CapFlags;
 
 use super::frames::turn_vehicle;
@@ -152,6 +152,41 @@ fn client_item_e80_what_is_kept_is_what_the_picture_shows() {
     turn_vehicle(&mut world, places, 50.0);
     run_looking(&mut world, places, SECOND / 10, -20.0, side);
     assert_eq!(looks(&mut world, places), (-20.0, round(side - 20.0)));
+}
+
+/// An axis left out stays where it is although the vehicle has turned since the gimbal told it: over ground where the gimbal is
+/// locked, from the nose otherwise, in whichever frame it tells its yaw.
+#[test]
+#[rustfmt::skip]
+fn an_axis_left_out_stays_where_it_is_while_the_vehicle_turns() {
+    // The gimbal looks 25° to the right of the nose when the heading is 30°; then the vehicle turns to 40°.
+    for (status_flags, told,  asked, yaw) in [
+        (44,           25.0,  44.0,  25.0),
+        (44,           25.0,  92.0,  25.0),
+        (76,           55.0,  44.0,  25.0),
+        (76,           55.0,  92.0,  25.0),
+        (92,           55.0,  44.0,  15.0),
+        (92,           55.0,  92.0,  15.0),
+        (60,           25.0,  44.0,  15.0),
+    ] {
+        let (mut world, places) = with_gimbal();
+        turn_vehicle(&mut world, places, 30.0);
+        let status = GIMBAL_DEVICE_ATTITUDE_STATUS_DATA {
+            delta_yaw: 30.0_f32.to_radians(),
+            ..device_status(world.now, status_flags, -5.0, told)
+        };
+        world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status));
+        world.run_for(SECOND / 10);
+        turn_vehicle(&mut world, places, 40.0);
+        world.forget();
+
+        let pitch_alone = pitchyaw(-30.0, NAN, NAN, NAN, asked);
+        assert_eq!(world.result_of(places.ground, GCS, &pitch_alone), Some(ACCEPTED));
+
+        let seen = pitch_yaw_deg(only_setpoint(&mut world, places).q);
+        assert_near(seen.0, -30.0, 0.001);
+        assert_near(seen.1, yaw, 0.001);
+    }
 }
 
 /// Client checklist E81: "1000 with flags 1 retracts; with flags 0 and angles goes back to work; flags 2 goes to neutral, angles
