@@ -18,6 +18,7 @@ mod commands;
 mod heading;
 mod inquiries;
 mod mount;
+mod ownership;
 mod roi;
 
 use std::collections::{BTreeMap, VecDeque};
@@ -35,7 +36,7 @@ use crate::wire::dialect::MavMessage;
 use crate::wire::ids::{CommandResult, FailureFlags, GimbalFlags};
 use crate::wire::{MavId, Target};
 use commands::LastCommand;
-use control::{Change, Control, PRIMARY_SILENCE, Place, Policy, Voice};
+use control::{Control, Voice};
 use events::{Event, RatesEnd};
 use heading::HeadingBias;
 use intervals::{DEFAULT_STATUS_INTERVAL, Schedule};
@@ -49,9 +50,6 @@ use voice::DeviceVoice;
 
 /// An attitude older than this is not where the gimbal looks now.
 const ATTITUDE_STALE: Duration = Duration::from_secs(1);
-
-/// So many senders are told apart in the counters of refusals.
-const MAX_COUNTED_SENDERS: usize = 64;
 
 /// Where a request came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -218,16 +216,6 @@ impl GimbalManager {
         self.carry_out(now, around);
     }
 
-    /// A message meant for this manager was malformed.
-    pub fn count_refusal(&mut self, sender: MavId, reason: &'static str) {
-        let holder = self.control.primary().filter(|_| control::STANDS_IN_THE_WAY.contains(&reason));
-        self.tell(Event::Refused { who: sender, reason, holder });
-        if self.rejected.len() >= MAX_COUNTED_SENDERS && !self.rejected.contains_key(&sender) {
-            return;
-        }
-        *self.rejected.entry(sender).or_default().entry(reason).or_default() += 1;
-    }
-
     /// News from the driver.
     pub fn handle_report(&mut self, now: Timestamp, report: Report, around: Surroundings<'_>) {
         if !matches!(report, Report::Attitude(_) | Report::Malformed { .. }) {
@@ -364,16 +352,6 @@ impl GimbalManager {
         self.carry_out(now, around);
     }
 
-    /// The autopilot's system id has changed: places held under the old one are void.
-    pub fn forget_system(&mut self, now: Timestamp, system: u8, around: Surroundings<'_>) {
-        let changes = self.control.forget_system(now, system);
-        self.after_changes_of_control(now, &changes);
-        if self.tracking.source().is_some_and(|source| source.system == system) {
-            self.tracking.stop_rates(now);
-        }
-        self.carry_out(now, around);
-    }
-
     pub fn settings(&self) -> &GimbalSettings {
         &self.settings
     }
@@ -457,24 +435,6 @@ impl GimbalManager {
         }
     }
 
-    fn policy<'a>(&self, around: Surroundings<'a>) -> Policy<'a> {
-        Policy {
-            open_when_unclaimed: self.rules.open_when_unclaimed,
-            takeover: self.settings.takeover,
-            px4_release_quirk: self.rules.px4_release_quirk,
-            autopilot: around.autopilot,
-            ranks: around.ranks,
-        }
-    }
-
-    fn gate(&self, now: Timestamp, sender: MavId, around: Surroundings<'_>) -> Result<Voice, Refusal> {
-        if around.other_vehicle {
-            return Err(Refusal::denied("other_vehicle"));
-        }
-        let silent = self.primary_demand.is_none_or(|at| now.since(at) > PRIMARY_SILENCE);
-        self.control.gate(sender, silent, self.policy(around))
-    }
-
     /// Whether there is a gimbal that can be steered now.
     fn steerable(&self) -> Result<&Capabilities, Refusal> {
         match (self.state, &self.capabilities) {
@@ -514,14 +474,6 @@ impl GimbalManager {
         self.tracking.demand(now, sender, &demand, &situation, timeouts)?;
         self.note_demand(now, sender);
         Ok(())
-    }
-
-    /// `sender` was obeyed.
-    fn note_demand(&mut self, now: Timestamp, sender: MavId) {
-        self.source_heard = now;
-        if self.control.primary() == Some(sender) {
-            self.primary_demand = Some(now);
-        }
     }
 
     fn timeouts(&self) -> RateTimeouts {
@@ -576,40 +528,6 @@ impl GimbalManager {
         self.told_flags = self.flags();
         if let Some(message) = self.status_message(now) {
             self.outputs.push_back(ManagerOutput::Broadcast { channels: None, message });
-        }
-    }
-
-    /// The places of holders that are silent for the lease are free.
-    fn end_leases(&mut self, now: Timestamp) {
-        let changes = self.control.handle_timeout(now, self.rules.lease_timeout);
-        self.after_changes_of_control(now, &changes);
-    }
-
-    /// Rates end with the control of who asked for them, and with every change of the primary; the angle stays. Each
-    /// change is told at once.
-    fn after_changes_of_control(&mut self, now: Timestamp, changes: &[Change]) {
-        if changes.is_empty() {
-            return;
-        }
-        self.last_command = None;
-        let holders = [self.control.primary(), self.control.secondary()];
-        let source = self.tracking.source();
-        let source_lost_its_place =
-            source.is_some() && !holders.contains(&source) && changes.iter().any(|change| change.from == source);
-        let primary_changed = changes.iter().any(|change| change.place == Place::Primary);
-        if primary_changed {
-            self.primary_demand = None;
-        }
-        if primary_changed || source_lost_its_place {
-            self.tracking.stop_rates(now);
-        }
-        // Who becomes primary finds the camera where it moved it.
-        if self.tracking.nudged_by().is_some_and(|by| !holders.contains(&Some(by))) {
-            self.tracking.end_nudge();
-        }
-        self.broadcast_status(now);
-        for change in changes {
-            self.tell(Event::Control(*change));
         }
     }
 

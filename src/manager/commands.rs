@@ -6,8 +6,7 @@
 
 use std::time::Duration;
 
-use super::events::Event;
-use super::request::{Command, Configure, Demand, DemandKind, Refusal};
+use super::request::{Command, Demand, DemandKind, Refusal};
 use super::{GimbalManager, ManagerOutput, Sender, Surroundings, messages};
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
@@ -193,27 +192,6 @@ impl GimbalManager {
             Ok(_) => Err(Refusal::denied("unknown_gimbal")),
             Err(refusal) => Err(refusal),
         }
-    }
-
-    fn do_gimbal_manager_configure(
-        &mut self,
-        now: Timestamp,
-        sender: MavId,
-        command: &Command,
-        around: Surroundings<'_>,
-    ) -> Result<(), Refusal> {
-        if around.other_vehicle {
-            return Err(Refusal::denied("other_vehicle"));
-        }
-        let configure = Configure::read(command)?;
-        let policy = self.policy(around);
-        let (before, was_truce) = (self.control.primary(), self.control.is_truce(now));
-        let changes = self.control.configure(now, sender, configure, policy)?;
-        self.after_changes_of_control(now, &changes);
-        if let Some(holder) = self.control.primary().filter(|_| self.control.is_truce(now) && !was_truce) {
-            self.tell(Event::AcquireWar { holder, other: before });
-        }
-        Ok(())
     }
 }
 
