@@ -17,6 +17,8 @@ fn state_of(heard: &Heard) -> Option<u8> {
 }
 
 /// "On change of owner, loss of lease, stop and SIGTERM zero is sent at once"; then the managers say goodbye.
+/// Protocol checklist 179: "When stopped by SIGTERM during a rate set-point, a zero-rate 284 is sent before exit, then one
+/// POWEROFF heartbeat."
 #[test]
 fn sigterm_stops_the_gimbal_and_says_goodbye() {
     let site = Site::new();

@@ -99,6 +99,8 @@ fn links() -> String {
 }
 
 /// "Angles in degrees, distances in metres, ages in milliseconds, unknown is `null`, never NaN."
+/// Protocol checklist 180: "When a value is NaN internally, HTTP JSON has null in its place and is parseable by a strict
+/// parser."
 #[test]
 fn what_is_not_known_is_null() {
     let site = Site::new();

@@ -17,7 +17,7 @@ use super::{COMPANION, FIELD, SECOND, fly, look, run_looking, told_control, with
 use crate::support::script::{
     ACCEPTED, DENIED, NAN, TEMPORARILY_REJECTED, ack, autopilot_state, command_int, command_long, device_information,
     device_status, gimbal_heartbeat, ground_heartbeat, ids, of, pitchyaw, px4_heartbeat, request_message, roi_location,
-    set_interval, take_control, usual_capabilities,
+    set_interval, usual_capabilities,
 };
 use crate::support::world::{AUTOPILOT, Arrival, GCS, GIMBAL, MANAGER, Place, World, heartbeat, three_links};
 
@@ -446,34 +446,6 @@ fn client_items_e31_to_e33_the_information_says_what_works() {
             );
         }
     }
-}
-
-/// "Two ground stations with the same ids … cannot be told apart as holders": they share control, and the person
-/// looking is told as long as both are there. One that comes from another port is one.
-#[test]
-fn two_ground_stations_under_one_id_share_control_and_are_told_of() {
-    let (mut world, places) = with_gimbal();
-    let second = world.open(0);
-    let told = |world: &World| world.snapshot().conflicts;
-    world.run_with(Duration::from_secs(5), &[(SECOND, places.ground, GCS, ground_heartbeat())]);
-    world.run_with(Duration::from_secs(8), &[(SECOND, second, GCS, ground_heartbeat())]);
-    assert_eq!(told(&world), Vec::<String>::new(), "it has moved");
-
-    let both = [(SECOND, places.ground, GCS, ground_heartbeat()), (SECOND, second, GCS, ground_heartbeat())];
-    world.run_with(Duration::from_secs(5), &both);
-    let conflicts = told(&world);
-    assert!(conflicts.len() == 1 && conflicts[0].contains("255/190"), "{conflicts:?}");
-    look(&mut world, places, 0.0, 0.0);
-    assert_eq!(world.result_of(places.ground, GCS, &take_control()), Some(ACCEPTED));
-    for place in [places.ground, second] {
-        world.forget();
-        world.send(place, GCS, &pitchyaw(NAN, NAN, NAN, NAN, 2.0));
-        let answers = world.take(place);
-        assert_eq!(of::<COMMAND_ACK_DATA>(&answers), [ack(GCS, 1000, ACCEPTED)]);
-    }
-
-    world.run_with(Duration::from_secs(40), &both[..1]);
-    assert_eq!(told(&world), Vec::<String>::new(), "one of them left");
 }
 
 /// A device says that it is there and what it can do.
