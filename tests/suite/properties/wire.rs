@@ -54,7 +54,10 @@ proptest! {
         let stream = [&stream[..], &[0; 600]].concat();
         let ours = known(decode_datagram(&stream).frames);
 
-        prop_assert_eq!(ours, frames_of_the_crates_reader(&stream));
+        let theirs = frames_of_the_crates_reader(&stream);
+        // It checks a message that it does not know with a seed of 0, so that one false start in 65,536 is a frame to it.
+        prop_assume!(known(theirs.clone()) == theirs);
+        prop_assert_eq!(ours, theirs);
     }
 }
 
