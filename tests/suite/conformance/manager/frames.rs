@@ -152,6 +152,32 @@ fn a_gimbal_with_a_heading_of_its_own_is_told_of() {
     }
 }
 
+/// D9: "axes it leaves out … are the measured attitude", of this moment: between two reports the vehicle turns, and a
+/// gimbal that follows it keeps its angle to the nose, one that is locked its direction, in whichever frame it tells it.
+#[test]
+fn what_was_measured_before_the_vehicle_turned_is_where_the_gimbal_looks_now() {
+    for (flags, yaw, from_nose) in [
+        (4 | 8 | 32, 20.0, 20.0),
+        (4 | 8 | 64, 30.0, 20.0),
+        (4 | 8 | 16 | 32, 20.0, 10.0),
+        (4 | 8 | 16 | 64, 30.0, 10.0),
+    ] {
+        let (mut world, places) = with_gimbal();
+        turn_vehicle(&mut world, places, 10.0);
+        let status = device_status(world.now, flags, 0.0, yaw);
+        let status = GIMBAL_DEVICE_ATTITUDE_STATUS_DATA { delta_yaw: f32::to_radians(10.0), ..status };
+        world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status));
+        world.run_for(SECOND / 5);
+        turn_vehicle(&mut world, places, 20.0);
+
+        assert_eq!(world.result_of(places.ground, GCS, &pitchyaw(-20.0, NAN, NAN, NAN, 44.0)), Some(ACCEPTED));
+
+        let (pitch, yaw) = pitch_yaw_deg(only_setpoint(&mut world, places).q);
+        assert_near(pitch, -20.0, 0.01);
+        assert_near(yaw, from_nose, 0.01);
+    }
+}
+
 /// "When a client asks earth yaw 90° and the device reports bit 128, 284 has flags 92 and yaw 90°."
 /// Protocol checklist 110: "When the device does not accept earth yaw and heading is 30°, the same request gives flags 44
 /// and yaw 60°, and follows as the heading changes, updating within 100 ms."
