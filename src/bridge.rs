@@ -229,6 +229,7 @@ impl Bridge {
         self.transactions.handle_timeout(now);
         self.ask_autopilot(now);
         self.tell_gimbals_state(now);
+        self.measure_round_trip(now);
         for at in 0..self.roster.len() {
             let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
             let gimbal = self.roster.get_mut(at);
@@ -259,6 +260,7 @@ impl Bridge {
             self.streams.poll_timeout().filter(|_| self.may_ask_autopilot()),
             self.transactions.poll_timeout(),
             self.state_for_gimbals.poll_timeout(),
+            self.timesync_due(),
         ];
         let gimbals = self.roster.iter().filter_map(|gimbal| gimbal.poll_timeout());
         let gimbals = gimbals.filter(|_| self.identity.system().is_some());

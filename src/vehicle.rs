@@ -9,6 +9,7 @@ mod clock;
 mod dated;
 mod estimator;
 mod landed_state;
+mod round_trips;
 mod state_for_gimbals;
 mod velocities;
 mod yaw_targets;
@@ -22,7 +23,7 @@ use crate::wire::dialect::{
     ATTITUDE_DATA, ATTITUDE_QUATERNION_DATA, ATTITUDE_TARGET_DATA, AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA,
     EKF_STATUS_REPORT_DATA, ESTIMATOR_STATUS_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA,
     HOME_POSITION_DATA, LOCAL_POSITION_NED_DATA, MessageData, POSITION_TARGET_GLOBAL_INT_DATA,
-    POSITION_TARGET_LOCAL_NED_DATA, SYSTEM_TIME_DATA,
+    POSITION_TARGET_LOCAL_NED_DATA, SYSTEM_TIME_DATA, TIMESYNC_DATA,
 };
 use crate::wire::ids::mav_autopilot;
 use attitudes::{Attitudes, Orientation};
@@ -30,6 +31,7 @@ pub use autopilot::Autopilot;
 use clock::{BootClock, Stamp};
 use dated::Dated;
 pub use landed_state::LandedState;
+use round_trips::RoundTrips;
 use velocities::Velocities;
 use yaw_targets::YawTargets;
 
@@ -39,6 +41,7 @@ pub struct Vehicle {
     last_heard: Option<Timestamp>,
     autopilot: Option<Autopilot>,
     clock: BootClock,
+    round_trips: RoundTrips,
     attitudes: Attitudes,
     /// `GLOBAL_POSITION_INT.hdg`.
     compass: Option<Dated<Angle>>,
@@ -103,7 +106,19 @@ impl Vehicle {
             self.estimator_status = Some(Dated::new(now, estimator::from_ekf_status_report(&message)));
         } else if let Some(message) = frame.decode::<SYSTEM_TIME_DATA>() {
             self.handle_boot_ms(now, frame, message.time_boot_ms);
+        } else if let Some(message) = frame.decode::<TIMESYNC_DATA>() {
+            self.round_trips.handle_timesync(now, &message);
         }
+    }
+
+    /// When the next `TIMESYNC` is due, by which the way from the autopilot is measured.
+    pub fn timesync_due(&self) -> Timestamp {
+        self.round_trips.due()
+    }
+
+    /// A request to be sent to the autopilot at once.
+    pub fn timesync_request(&mut self, now: Timestamp) -> TIMESYNC_DATA {
+        self.round_trips.request(now)
     }
 
     /// How often the autopilot was started anew while it was listened to.

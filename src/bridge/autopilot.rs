@@ -12,7 +12,7 @@ use crate::gimbals::mavlink_v2::packet;
 use crate::manager::DeviceState;
 use crate::timestamp::Timestamp;
 use crate::vehicle::Autopilot;
-use crate::wire::dialect::MavMessage;
+use crate::wire::dialect::{MavMessage, TIMESYNC_DATA};
 use crate::wire::ids::{command, message};
 use crate::wire::{Frame, MavId, Target};
 
@@ -171,6 +171,25 @@ impl Bridge {
             Some(GimbalToTell { channel, device, manager: gimbal.component })
         });
         there.filter(move |gimbal| !of_autopilot.contains(gimbal.channel))
+    }
+
+    /// When the way from the autopilot is measured next: while its state is told by us, delays included.
+    pub(super) fn timesync_due(&self) -> Option<Timestamp> {
+        (self.state_for_gimbals.is_telling() && self.autopilot.is_some()).then(|| self.vehicle.timesync_due())
+    }
+
+    pub(super) fn measure_round_trip(&mut self, now: Timestamp) {
+        let Some(autopilot) = self.autopilot.filter(|_| self.timesync_due().is_some_and(|due| due <= now)) else {
+            return;
+        };
+        let request = TIMESYNC_DATA {
+            target_system: autopilot.system,
+            target_component: autopilot.component,
+            ..self.vehicle.timesync_request(now)
+        };
+        let channels = self.router.route_own(now, Target::Component(autopilot));
+        let manager = self.roster.get_mut(0).component;
+        self.send(now, channels, manager, &MavMessage::TIMESYNC(request));
     }
 
     /// Bits per second, where the channel is a serial line.

@@ -83,6 +83,11 @@ impl StateForGimbals {
         self.is_ours
     }
 
+    /// Whether there is something to tell, and somebody to tell it.
+    pub fn is_telling(&self) -> bool {
+        self.lines.iter().any(|line| line.told.is_some())
+    }
+
     /// The channels to tell it on, each with the least time from one to the next.
     pub fn set_lines(&mut self, now: Timestamp, lines: &[(ChannelId, Duration)]) {
         self.lines.retain(|line| lines.iter().any(|(channel, _)| *channel == line.channel));

@@ -3,7 +3,7 @@
 //! A stamp of 32 bits wraps, after 49.7 days in milliseconds and after 71.6 minutes in microseconds; the time made of
 //! them here does not. What comes later than the fastest message lately is late by the difference: how much longer it
 //! was measured, queued and sent before it got here. The part that all messages have in common cannot be told from
-//! stamps alone and is not counted.
+//! stamps alone, see [`round_trips`](super::round_trips).
 
 use std::time::Duration;
 

@@ -21,8 +21,9 @@ impl Vehicle {
     /// The state at `now`, or `None` while no attitude of the last second is known.
     ///
     /// Between two attitudes the last one is turned on, so that each message tells something new; the delays are the
-    /// true ones, of what was measured and not extrapolated. `time_boot_us` is the autopilot's time at `now`, or ours
-    /// where it tells none: what is delayed was measured that much earlier.
+    /// true ones, of what was measured and not extrapolated: how much later it came than the autopilot's fastest message,
+    /// and how long that takes. `time_boot_us` is the autopilot's time at `now`, or ours where it tells none: what is
+    /// delayed was measured that much earlier.
     pub fn state_for_gimbals(&self, now: Timestamp, target: Target) -> Option<AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA> {
         let told = self.attitudes.orientation(now)?;
         let age = told.age(now);
@@ -33,17 +34,19 @@ impl Vehicle {
             }
             None => (told.value.attitude, Duration::ZERO),
         };
+        let one_way = self.round_trips.one_way().unwrap_or_default();
         let velocity = self.velocities.velocity(now);
         let [vx, vy, vz] = velocity.map_or([f32::NAN; 3], |velocity| velocity.value.ned);
         let turn = told.value.turn.map(|turn| turn.about_down().radians_per_second() as f32);
         Some(AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA {
-            time_boot_us: self.clock.time_us(now).unwrap_or(now.as_micros()),
+            time_boot_us: self.clock.time_us(now + one_way).unwrap_or(now.as_micros()),
             q: attitude.to_wxyz(),
-            q_estimated_delay_us: delay_us(age - turned_on, told.value.late),
+            q_estimated_delay_us: delay_us(age - turned_on, told.value.late.map(|late| late + one_way)),
             vx,
             vy,
             vz,
-            v_estimated_delay_us: velocity.map_or(0, |velocity| delay_us(velocity.age(now), velocity.value.late)),
+            v_estimated_delay_us: velocity
+                .map_or(0, |velocity| delay_us(velocity.age(now), velocity.value.late.map(|late| late + one_way))),
             feed_forward_angular_velocity_z: self.yaw_targets.rate(now).map_or(f32::NAN, radians_per_second),
             estimator_status: self.estimator_status(now).unwrap_or(NO_ESTIMATES),
             target_system: target.system(),

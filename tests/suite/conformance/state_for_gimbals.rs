@@ -1,6 +1,8 @@
 //! D21: "286: forwarded; asked for (511) where absent; made by us (from S/19x, to the gimbal's link only) when the request
 //! was refused or ignored three times; `synthesize_286 = "auto" | "off"`".
 
+mod lines;
+
 use std::collections::BTreeSet;
 use std::time::Duration;
 
