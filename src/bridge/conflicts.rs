@@ -110,6 +110,12 @@ impl Conflict {
                  Connect the autopilot, or set [vehicle] system_id.",
                 if *waits { "we would use without one" } else { "we use without one" }
             ),
+            Self::DeviceElsewhere { device, managed_on, other_on } if managed_on == other_on => format!(
+                "{device} is heard in two places, both on link {}; the gimbal is the one that was heard first, and the \
+                 other is not believed. If there are two gimbals, give one of them another component id; if not, \
+                 something sends its frames back.",
+                name(*managed_on)
+            ),
             Self::DeviceElsewhere { device, managed_on, other_on } => format!(
                 "{device} is heard in two places; the gimbal is the one on link {}, and what comes on link {} is not \
                  believed. If there are two gimbals, give one of them another component id; if not, something sends \
@@ -126,6 +132,11 @@ impl Conflict {
                 "gimbal {former} speaks as {device} now, but its [[gimbal]] entry has component_id = {}. Correct the \
                  one or the other.",
                 former.component
+            ),
+            Self::StationTwice { station, links: [one, other] } if one == other => format!(
+                "ground station {station} is heard in two places, both on link {}. If it is one station with two \
+                 connections, all is well; if there are two, they share control: give one of them another system id.",
+                name(*one)
             ),
             Self::StationTwice { station, links: [one, other] } => format!(
                 "ground station {station} is heard in two places, on link {} and on link {}. If it is one station \

@@ -35,7 +35,7 @@ impl Bridge {
         let is_believed = self.is_believed(role, source.system);
         let sign = || sign_of(frame);
         let hearing = if self.roster.is_device(source) {
-            let is_sign_of_life = is_believed && matches!(sign(), Sign::Heartbeat | Sign::Device);
+            let is_sign_of_life = || is_believed && matches!(sign(), Sign::Heartbeat | Sign::Device);
             self.roster.hear(now, source, place, is_sign_of_life)
         } else {
             Hearing::Unknown
@@ -44,6 +44,7 @@ impl Bridge {
         match hearing {
             Hearing::Device { gimbal, twin } => {
                 gimbal.driver.handle_received(now, frame);
+                let may_be_self_managed = gimbal.is_only_a_heartbeat();
                 if let Some(other_on) = twin {
                     let conflict = Conflict::DeviceElsewhere { device: source, managed_on: place.link, other_on };
                     self.conflicts.note(now, conflict);
@@ -51,7 +52,7 @@ impl Bridge {
                 if is_heartbeat && source.system != system {
                     self.conflicts.note(now, Conflict::ForeignSystem { device: source, system, is_managed: true });
                 }
-                if !is_heartbeat && sign() == Sign::OwnGimbal {
+                if may_be_self_managed && sign() == Sign::OwnGimbal {
                     self.roster.note_self_managed(now, source);
                 }
             }

@@ -78,14 +78,21 @@ impl Gimbal {
     }
 
     /// Whether nothing that a v2 device says of itself was heard, but its heartbeat.
-    fn is_only_a_heartbeat(&self) -> bool {
+    pub fn is_only_a_heartbeat(&self) -> bool {
         self.adopted.is_some() && !self.manager.is_known() && self.manager.status().is_none()
     }
 }
 
 impl Roster {
-    /// What a frame of a managed device means that came in at `place`.
-    pub fn hear(&mut self, now: Timestamp, device: MavId, place: Place, is_sign_of_life: bool) -> Hearing<'_> {
+    /// What a frame of a managed device means that came in at `place`. Only a sign of life, which is looked for where it
+    /// matters, lets it take the place of one that is lost.
+    pub fn hear(
+        &mut self,
+        now: Timestamp,
+        device: MavId,
+        place: Place,
+        is_sign_of_life: impl FnOnce() -> bool,
+    ) -> Hearing<'_> {
         let Some(gimbal) = self.gimbals.iter_mut().find(|gimbal| gimbal.adopted == Some(device)) else {
             return Hearing::Unknown;
         };
@@ -102,7 +109,7 @@ impl Roster {
         }
         let twin_was_heard = gimbal.has_twin.is_some_and(|at| now.since(at) < TWIN_REMEMBERED);
         let is_free = if twin_was_heard { gimbal.is_lost_for_good(now) } else { gimbal.is_lost() };
-        if !(is_free && is_sign_of_life) {
+        if !(is_free && is_sign_of_life()) {
             gimbal.elsewhere = Some(place.link);
             return Hearing::Elsewhere;
         }

@@ -355,6 +355,19 @@ fn of_two_devices_under_one_id_the_first_is_managed() {
     assert!(other.iter().all(|arrival| ![284, COMMAND_LONG].contains(&arrival.id())), "it is told and asked nothing");
 }
 
+/// Two UDP peers of one link may be two such devices as well.
+#[test]
+fn of_two_devices_under_one_id_on_one_link_the_first_is_managed() {
+    let mut rig = Rig::new(three_links());
+    rig.peer = rig.world.open(1);
+    rig.introduce(rig.gimbals, GIMBAL);
+    rig.speak_for(2 * SECOND, &[(rig.gimbals, GIMBAL), (rig.peer, GIMBAL)]);
+
+    let conflicts = rig.conflicts();
+    assert!(conflicts.len() == 1 && conflicts[0].contains("both on link gimbal"), "{conflicts:?}");
+    assert!(rig.conducts(rig.gimbals) && !rig.conducts(rig.peer));
+}
+
 /// R21: clients, who cannot tell them apart either, see the first only; with `firewall = "warn"` both.
 #[test]
 fn of_two_devices_under_one_id_clients_see_the_one_that_is_managed() {

@@ -36,7 +36,7 @@ fn a67_two_stations_under_one_id_are_told() {
         }
         let conflicts = world.snapshot().conflicts;
         assert_eq!(conflicts.len(), told, "{conflicts:?}");
-        assert!(conflicts.iter().all(|text| text.contains("255/190") && text.contains("another system id")));
+        assert!(conflicts.iter().all(|text| text.contains("255/190") && text.contains("both on link ground")));
 
         // One takes control, and the other has it.
         assert_eq!(world.result_of(places.ground, GCS, &take_control()), Some(ACCEPTED));
