@@ -12,7 +12,9 @@ from steps import Failure, angle_between, wait_for
 class Seen(NamedTuple):
     """Degrees; yaw from the vehicle's nose and from North, each None where the client does not say."""
 
+    # When it came; and when it was so, on a clock that begins anywhere.
     time: float
+    clock: float
     pitch: float
     yaw_vehicle: float
     yaw_north: float
@@ -40,14 +42,14 @@ def wrapped(angle):
 def slope(seen, axis):
     """How fast `axis` turned, degrees per second."""
     # The slope of the line nearest to all of them: one late arrival does not matter.
-    mean_time = sum(one.time for one in seen) / len(seen)
+    mean_time = sum(one.clock for one in seen) / len(seen)
     turned, total = [0.0], 0.0
     for before, after in zip(seen, seen[1:]):
         total += wrapped(getattr(after, axis) - getattr(before, axis))
         turned.append(total)
     mean_turned = sum(turned) / len(turned)
-    spread = sum((one.time - mean_time) ** 2 for one in seen)
-    return sum((one.time - mean_time) * (angle - mean_turned) for one, angle in zip(seen, turned)) / spread
+    spread = sum((one.clock - mean_time) ** 2 for one in seen)
+    return sum((one.clock - mean_time) * (angle - mean_turned) for one, angle in zip(seen, turned)) / spread
 
 
 class Attitudes:
@@ -57,18 +59,20 @@ class Attitudes:
         self._lock = threading.Lock()
         self._seen = deque(maxlen=2000)
 
-    def add(self, pitch, yaw_vehicle=None, yaw_north=None, roll=None):
+    def add(self, pitch, yaw_vehicle=None, yaw_north=None, roll=None, clock=None):
+        now = time.monotonic()
         with self._lock:
-            self._seen.append(Seen(time.monotonic(), pitch, yaw_vehicle, yaw_north, roll))
+            self._seen.append(Seen(now, now if clock is None else clock, pitch, yaw_vehicle, yaw_north, roll))
 
     def add_status(self, message):
         """A GIMBAL_DEVICE_ATTITUDE_STATUS."""
         roll, pitch, yaw = angles_of(message.q)
         heading = math.degrees(message.delta_yaw)
+        clock = message.time_boot_ms / 1000
         if message.flags & YAW_IN_EARTH_FRAME:
-            self.add(pitch, wrapped(yaw - heading), yaw, roll)
+            self.add(pitch, wrapped(yaw - heading), yaw, roll, clock)
         else:
-            self.add(pitch, yaw, wrapped(yaw + heading), roll)
+            self.add(pitch, yaw, wrapped(yaw + heading), roll, clock)
 
     def since(self, moment):
         with self._lock:

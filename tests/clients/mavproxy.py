@@ -14,6 +14,7 @@ import time
 import zipfile
 from importlib.metadata import version
 
+from attitudes import slope
 from dialect import mavlink
 from frames import commands
 from ground import GroundStation
@@ -236,13 +237,12 @@ def body(steps, rig, wire, proxy):
         steers("camera mount angle 20 0", pitch=20, yaw_vehicle=0)
         place = proxy.say("gimbal rate 0 -7 5")
         wait_for("a pitch of 15°", lambda: camera.last().pitch < 15, 5)
-        seen = camera.watch(4.0)
+        seen = camera.watch(4.2)
+        begin = seen[0].clock
         for axis, rate in (("pitch", -7), ("yaw_vehicle", 5)):
-            parts = [one for one in seen if one.time - seen[0].time < 4]
-            for begin in range(4):
-                part = [one for one in parts if begin <= one.time - parts[0].time < begin + 1]
-                turned = (getattr(part[-1], axis) - getattr(part[0], axis)) / (part[-1].time - part[0].time)
-                expect(abs(turned - rate) < 1, f"{axis} turns at {turned:.2f} °/s in second {begin}")
+            for second in range(4):
+                turned = slope([one for one in seen if second <= one.clock - begin <= second + 1], axis)
+                expect(abs(turned - rate) < 1, f"{axis} turns at {turned:.2f} °/s in second {second}")
         proxy.say("gimbal rate 0 0 0")
         camera.wait_still("pitch", 3)
         proxy.expect_no_complaint(place)

@@ -186,8 +186,12 @@ def body(steps, rig, listener, client):
             # The simulated device turns without end; a slider in a ground station needs numbers.
             expect(math.isclose(message.yaw_min, -math.pi, abs_tol=1e-6), f"yaw_min {message.yaw_min}")
             expect(math.isclose(message.yaw_max, math.pi, abs_tol=1e-6), f"yaw_max {message.yaw_max}")
-            can_aim = mavlink.GIMBAL_MANAGER_CAP_FLAGS_CAN_POINT_LOCATION_GLOBAL
-            expect(message.cap_flags == device.cap_flags | can_aim, f"{message.cap_flags:#x}, {device.cap_flags:#x}")
+            # A place on the map from when the vehicle's is known.
+            aims = mavlink.GIMBAL_MANAGER_CAP_FLAGS_CAN_POINT_LOCATION_LOCAL
+            places = mavlink.GIMBAL_MANAGER_CAP_FLAGS_CAN_POINT_LOCATION_GLOBAL
+            allowed = {device.cap_flags | aims, device.cap_flags | aims | places}
+            expect(message.cap_flags in allowed, f"{message.cap_flags:#x}, {device.cap_flags:#x}")
+        expect(told[-1].cap_flags & places, f"cannot point at a place: {told[-1].cap_flags:#x}")
 
     def setpoints():
         sent = [frame.message for frame in ours(serial, "GIMBAL_DEVICE_SET_ATTITUDE")]

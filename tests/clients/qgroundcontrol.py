@@ -150,10 +150,10 @@ class Operator:
         """Turns evenly over 2 s, in which it is told the rate several times."""
         seen = self.camera.watch(2.2)
         # The first moments go into getting there.
-        begin = seen[0].time + 0.2
+        begin = seen[0].clock + 0.2
         for part in range(4):
             times = (begin + part * 0.5, begin + (part + 1) * 0.5)
-            turned = slope([one for one in seen if times[0] <= one.time <= times[1]], axis)
+            turned = slope([one for one in seen if times[0] <= one.clock <= times[1]], axis)
             expect(abs(turned - rate) < 2, f"{axis} turns at {turned:.2f} °/s from {part / 2:.1f} s on")
 
     def turns(self):
