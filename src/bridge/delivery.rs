@@ -282,6 +282,10 @@ impl Bridge {
             return ChannelSet::EMPTY;
         }
         match frame.message_id() {
+            // The first heartbeat that a gimbal hears when it starts again is not to be a ground station's.
+            message::HEARTBEAT if Some(frame.source().system) != self.identity.system() => {
+                gimbals.without(self.roster.channels_of_lost())
+            }
             message::HEARTBEAT
             | message::SYSTEM_TIME
             | message::TIMESYNC

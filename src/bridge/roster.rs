@@ -223,6 +223,12 @@ impl Roster {
         self.gimbals.iter().find(|gimbal| gimbal.adopted == Some(device))?.channel
     }
 
+    /// The open channels on which a gimbal was lost.
+    pub fn channels_of_lost(&self) -> ChannelSet {
+        let lost = self.gimbals.iter().filter(|gimbal| gimbal.is_lost()).filter_map(|gimbal| gimbal.channel);
+        lost.fold(ChannelSet::EMPTY, |set, channel| set.union(channel.into()))
+    }
+
     /// Whether `id` is a managed device.
     pub fn is_device(&self, id: MavId) -> bool {
         self.gimbals.iter().any(|gimbal| gimbal.adopted == Some(id))

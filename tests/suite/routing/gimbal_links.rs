@@ -159,3 +159,22 @@ fn d14_what_other_vehicles_say_to_all_is_not_for_our_gimbal() {
     // What is addressed to it is delivered.
     assert_eq!(rig.deliver("ground", &addressed(OTHER_AUTOPILOT, MISSION_REQUEST_LIST, (1, 154))), ["gimbal"]);
 }
+
+/// Protocol notes 4.4: "never let a GCS heartbeat be the first one", also for a gimbal that was lost and starts again.
+#[test]
+fn d14_a_gimbal_that_starts_again_hears_no_ground_station_first() {
+    let mut rig = rig();
+    rig.introduce("autopilot", AUTOPILOT);
+    let station = frame(GROUND, HEARTBEAT, &[0, 0, 0, 0, 6, 8, 0, 4, 3]);
+    let autopilot = frame(AUTOPILOT, HEARTBEAT, &[0, 0, 0, 0, 2, 12, 0, 4, 3]);
+    assert!(rig.deliver_amid_ours("ground", &station).contains(&"gimbal"));
+
+    rig.run_for(Duration::from_secs(4));
+    let before = rig.dropped("gimbal", "not_for_gimbal");
+    assert!(!rig.deliver_amid_ours("ground", &station).contains(&"gimbal"), "it is lost");
+    assert_eq!(rig.dropped("gimbal", "not_for_gimbal"), before + 1);
+    assert!(rig.deliver_amid_ours("autopilot", &autopilot).contains(&"gimbal"));
+
+    rig.introduce("gimbal", GIMBAL);
+    assert!(rig.deliver_amid_ours("ground", &station).contains(&"gimbal"), "it is there again");
+}
