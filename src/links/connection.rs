@@ -87,7 +87,10 @@ impl Connection {
                     self.waits_for_room = true;
                     break;
                 }
-                Poll::Ready(Ok(())) => self.flush(now),
+                Poll::Ready(Ok(())) => {
+                    self.waits_for_room = false;
+                    self.flush(now);
+                }
                 Poll::Ready(Err(error)) => self.failure = Some(error),
             }
         }
@@ -111,8 +114,8 @@ impl Connection {
     }
 
     pub fn flush(&mut self, now: Timestamp) {
-        self.waits_for_room = false;
         if !self.output.is_empty()
+            && !self.waits_for_room
             && let Err(error) = self.output.write(now, |bytes| self.stream.try_write(bytes))
         {
             self.failure = Some(error);

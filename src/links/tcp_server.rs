@@ -272,6 +272,32 @@ mod tests {
         }
     }
 
+    /// "never spins on": as long as a peer does not read, the link is woken by room or by the end of its patience, also
+    /// when others' wake-ups and further frames flush it.
+    #[test]
+    fn a_peer_that_does_not_read_wakes_nobody() {
+        let (mut rig, address) = rig();
+        let mut slow = connect(&mut rig, address, 0);
+        // The kernel finds more room for a while; what counts is that it has none in the end.
+        while rig.poll_once().is_none() {
+            rig.send(0, &frame(1));
+        }
+        rig.expect_silence();
+
+        for _ in 0..10 {
+            rig.send(0, &frame(2));
+            assert_eq!(rig.link.poll_timeout(), Some(rig.now + Duration::from_secs(10)));
+            assert!(matches!(rig.poll_once(), None | Some(Seen::SendFailed(0, ..))));
+        }
+
+        slow.set_nonblocking(true).expect("a socket takes it");
+        rig.until(|rig| {
+            read_available(&mut slow, &mut Vec::new());
+            (!rig.link.has_unsent()).then_some(())
+        });
+        assert_eq!(rig.link.poll_timeout(), None);
+    }
+
     /// "connection closed after 10 s without progress".
     #[test]
     fn a_peer_that_takes_nothing_for_ten_seconds_is_closed() {
