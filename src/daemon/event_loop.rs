@@ -86,23 +86,22 @@ impl EventLoop {
     /// Does what there is to do; ready when the process is to end.
     pub fn poll(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         let now = self.clock.now();
+        let mut more = false;
+        for link in 0..self.ports.links.len() {
+            more |= self.poll_link(now, link, cx);
+        }
+        // What was received is answered before anything that nobody waits for.
+        self.flush(now);
         self.timer.poll(cx)?;
         if self.shutdown.poll(now, cx) {
             tracing::info!("stopping");
             self.service_manager.stopping();
             self.input(now, Input::Shutdown);
         }
-        let mut more = false;
-        for link in 0..self.ports.links.len() {
-            more |= self.poll_link(now, link, cx);
-        }
-        // Last, so that what an input made due at once leaves with the same wake-up.
         if self.core.poll_timeout().is_some_and(|at| now >= at) {
             self.core.handle_timeout(now);
             self.ports.carry_out(&mut self.core);
-        }
-        for link in &mut self.ports.links {
-            link.flush(now);
+            self.flush(now);
         }
         self.poll_window(now, cx);
         self.serve_service_manager(now);
@@ -128,9 +127,17 @@ impl EventLoop {
         progress == Progress::More
     }
 
+    /// What an input or a timer wants to be sent leaves with the same wake-up.
     fn input(&mut self, now: Timestamp, input: Input<'_>) {
         self.core.handle_input(now, input);
         self.ports.carry_out(&mut self.core);
+        self.flush(now);
+    }
+
+    fn flush(&mut self, now: Timestamp) {
+        for link in &mut self.ports.links {
+            link.flush(now);
+        }
     }
 
     fn poll_window(&mut self, now: Timestamp, cx: &mut Context<'_>) {

@@ -17,6 +17,9 @@ use super::send_failures::SendFailures;
 
 /// Asked of the kernel, which gives what it may: bursts wait there while another link is served.
 const RECEIVE_BUFFER: usize = 1 << 20;
+/// Datagrams in the system call that finds out whether there are many: mostly there is one, and to prepare room for
+/// many costs more than to receive it.
+const FEW: usize = 4;
 /// Most datagrams in one system call.
 const SENDS: usize = 32;
 /// Frames are collected up to so many bytes.
@@ -31,6 +34,8 @@ pub struct DatagramSocket {
     receive_headers: MultiHeaders<SockaddrStorage>,
     send_headers: MultiHeaders<SockaddrStorage>,
     received: Vec<(usize, Option<SocketAddr>)>,
+    /// The last batch was of many.
+    is_busy: bool,
     outgoing: Outgoing,
     unusable: Option<Errno>,
 }
@@ -77,6 +82,7 @@ impl DatagramSocket {
             receive_headers: MultiHeaders::preallocate(READS, None),
             send_headers: MultiHeaders::preallocate(SENDS, None),
             received: Vec::with_capacity(READS),
+            is_busy: false,
             outgoing: Outgoing::default(),
             unusable: None,
         })
@@ -101,8 +107,15 @@ impl DatagramSocket {
                 // A full batch: the rest waits until this one is dealt with and the other links had their turn.
                 return Ok(Progress::More);
             }
-            match receive(self.socket.get_ref(), &mut self.receive_headers, inbox, &mut self.received) {
-                Ok(()) if self.received.len() == READS => {}
+            let (socket, headers) = (self.socket.get_ref(), &mut self.receive_headers);
+            let (most, result) = if self.is_busy {
+                (READS, receive::<READS>(socket, headers, inbox, &mut self.received))
+            } else {
+                (FEW, receive::<FEW>(socket, headers, inbox, &mut self.received))
+            };
+            self.is_busy = self.received.len() >= FEW;
+            match result {
+                Ok(()) if self.received.len() == most => {}
                 // Fewer than asked for means that the socket is empty.
                 Ok(()) | Err(Errno::EAGAIN) => ready.clear_ready(),
                 // An earlier datagram was refused by its receiver; nothing is wrong with this socket.
@@ -199,14 +212,15 @@ fn concerns_the_socket(error: Errno) -> bool {
     matches!(error, Errno::ENETUNREACH | Errno::ENETDOWN | Errno::EADDRNOTAVAIL | Errno::EINVAL | Errno::ENODEV)
 }
 
-fn receive(
+/// Receives at most `MOST` datagrams.
+fn receive<const MOST: usize>(
     socket: &UdpSocket,
     headers: &mut MultiHeaders<SockaddrStorage>,
     inbox: &mut Inbox,
     received: &mut Vec<(usize, Option<SocketAddr>)>,
 ) -> Result<(), Errno> {
     let mut free = inbox.buffers();
-    let mut buffers: [_; READS] = std::array::from_fn(|_| [IoSliceMut::new(free.next().unwrap_or_default())]);
+    let mut buffers: [_; MOST] = std::array::from_fn(|_| [IoSliceMut::new(free.next().unwrap_or_default())]);
     let datagrams = recvmmsg(socket.as_raw_fd(), headers, &mut buffers, MsgFlags::MSG_DONTWAIT, None)?;
     received.extend(datagrams.map(|datagram| (datagram.bytes, datagram.address.as_ref().and_then(to_std))));
     Ok(())
