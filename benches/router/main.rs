@@ -19,10 +19,10 @@ const RELAY: &str = "relay";
 
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();
-    if let [_, command, listen, peer] = &arguments[..]
+    if let [_, command, route] = &arguments[..]
         && command == RELAY
     {
-        return relay::run(listen, peer);
+        return relay::run([route.as_str()]);
     }
     let directory = tempfile::tempdir().expect("a directory for the configuration");
     let daemon_rig = Rig::new();
@@ -35,10 +35,8 @@ fn main() {
         env!("CARGO_BIN_EXE_gimbald").as_ref(),
         &["--log".as_ref(), "warn".as_ref(), "run".as_ref(), "--config".as_ref(), configuration.as_ref()],
     );
-    let relay = Forwarder::start(
-        &program,
-        &[RELAY.as_ref(), relay_rig.listen.to_string().as_ref(), relay_rig.peer().to_string().as_ref()],
-    );
+    let route = relay::route(relay_rig.listen, &relay_rig.peer().to_string());
+    let relay = Forwarder::start(&program, &[RELAY.as_ref(), route.as_ref()]);
     daemon_rig.wait_for_forwarder();
     relay_rig.wait_for_forwarder();
 
