@@ -179,7 +179,7 @@ class Vocabulary:
         for yaw in directions:
             self.client.angles(-5, yaw, lock=True)
             self.camera.wait_at(pitch=-5, yaw_north=yaw)
-        rate = self.camera.rate("yaw_vehicle", 1.0)
+        rate = self.camera.rate("yaw_vehicle")
         expect(abs(rate + TURN_RATE_DPS) < 1, f"turns at {rate:.2f} °/s against the vehicle")
         self.camera.wait_at(pitch=-5, yaw_north=directions[-1])
 
@@ -192,8 +192,8 @@ class Vocabulary:
         self.client.rates(0, 0, once=once)
         expect(abs(pitch_rate + 10) < 1.5, f"pitch turns at {pitch_rate:.2f} °/s")
         expect(abs(yaw_rate - 5) < 1.5, f"yaw turns at {yaw_rate:.2f} °/s")
-        self.camera.wait_still("pitch", 1)
-        self.camera.wait_still("yaw_vehicle", 1)
+        self.camera.wait_still("pitch", 2)
+        self.camera.wait_still("yaw_vehicle", 2)
 
     def streamed_rate_ends(self):
         self.client.rates(0, 15, once=False)
@@ -207,7 +207,7 @@ class Vocabulary:
         self.client.angles(0, 0, lock=True)
         self.camera.wait_at(pitch=0, yaw_north=0)
         self.client.rates(0, 10, lock=True)
-        rate = self.camera.rate("yaw_north", 1.0)
+        rate = self.camera.rate("yaw_north", 1.5)
         self.client.rates(0, 0, lock=True)
         expect(abs(rate - 10) < 2, f"yaw turns at {rate:.2f} °/s over ground")
 
