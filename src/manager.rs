@@ -28,7 +28,7 @@ use crate::channel::{ChannelId, ChannelSet};
 use crate::geometry::{Angle, Position};
 use crate::gimbals::capabilities::Capabilities;
 use crate::gimbals::report::{GimbalStatus, Identity, Report};
-use crate::gimbals::setpoint::Setpoint;
+use crate::gimbals::setpoint::{Setpoint, Turning};
 use crate::gimbals::settings::GimbalSettings;
 use crate::timestamp::Timestamp;
 use crate::vehicle::Vehicle;
@@ -127,6 +127,10 @@ pub struct GimbalManager {
     identity: Identity,
     capabilities: Option<Capabilities>,
     status: Option<(Timestamp, GimbalStatus)>,
+    /// How the device was turning when it was lost.
+    unstopped: Option<Turning>,
+    /// When its device last told an attitude, also after it was lost.
+    told_attitude: Option<Timestamp>,
     control: Control,
     tracking: Tracking,
     status_schedule: Schedule,
@@ -162,6 +166,8 @@ impl GimbalManager {
             identity: Identity::default(),
             capabilities: None,
             status: None,
+            unstopped: None,
+            told_attitude: None,
             control: Control::default(),
             status_schedule: Schedule::new(Interval::Every(DEFAULT_STATUS_INTERVAL)),
             information_schedule: Schedule::new(Interval::Off),
@@ -223,7 +229,12 @@ impl GimbalManager {
         }
         match report {
             Report::Restarted => {
+                // Its clock may have jumped while it goes on turning.
+                let unstopped = self.tracking.unstopped();
                 self.tracking.forget();
+                if let Some(turning) = unstopped {
+                    self.tracking.halt(now, turning);
+                }
                 self.heading_bias = HeadingBias::default();
                 self.tell(Event::Restarted { device: self.device });
             }
@@ -234,6 +245,11 @@ impl GimbalManager {
                     self.identity = Identity::default();
                     self.capabilities = None;
                     self.status = None;
+                    self.told_attitude = None;
+                    self.unstopped = None;
+                }
+                if let Some(turning) = self.unstopped.take() {
+                    self.tracking.halt(now, turning);
                 }
                 let known = self.device.replace(device) == Some(device);
                 self.state = DeviceState::Alive;
@@ -257,6 +273,7 @@ impl GimbalManager {
                     voice.handle_status(status);
                 }
                 self.status = Some((now, status));
+                self.told_attitude = Some(now);
                 if let (Some(_), Some(capabilities)) = (status.heading, self.capabilities) {
                     let situation = self.situation(now, &capabilities, around);
                     self.tracking.handle_turned(now, &situation);
@@ -270,6 +287,11 @@ impl GimbalManager {
             Report::Lost => {
                 self.state = DeviceState::Lost;
                 self.status = None;
+                // It may hear us while we do not hear it; and it is stopped when it is heard again.
+                self.unstopped = self.tracking.unstopped();
+                if let Some(turning) = self.unstopped {
+                    self.outputs.push_back(ManagerOutput::Steer(Setpoint::Turn(turning.stopped())));
+                }
                 self.tracking.forget();
                 self.tell(Event::Lost { device: self.device });
             }
@@ -386,6 +408,11 @@ impl GimbalManager {
     /// The latest attitude and when it came, however old.
     pub fn status(&self) -> Option<(Timestamp, &GimbalStatus)> {
         self.status.as_ref().map(|(at, status)| (*at, status))
+    }
+
+    /// When the device last told an attitude, also if it is lost.
+    pub fn told_attitude_at(&self) -> Option<Timestamp> {
+        self.told_attitude
     }
 
     pub fn control(&self) -> &Control {

@@ -154,7 +154,11 @@ impl Bridge {
     }
 
     fn attitude_snapshot(&self, now: Timestamp, gimbal: &Gimbal) -> AttitudeSnapshot {
-        let Some((at, status)) = gimbal.manager.status() else { return AttitudeSnapshot::default() };
+        let Some((at, status)) = gimbal.manager.status() else {
+            // Of a lost gimbal nothing is known but since when.
+            let age_ms = gimbal.manager.told_attitude_at().map(|at| millis(now.since(at)));
+            return AttitudeSnapshot { age_ms, ..AttitudeSnapshot::default() };
+        };
         let angles = status.attitude.angles();
         let yaw = status.attitude.yaw();
         let heading = status.heading.or(self.vehicle.heading(now));

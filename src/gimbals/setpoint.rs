@@ -59,6 +59,17 @@ pub enum RadioControl {
     Exclusive,
 }
 
+impl Turning {
+    pub fn is_zero(&self) -> bool {
+        [self.roll.unwrap_or(AngularRate::ZERO), self.pitch, self.yaw].iter().all(|rate| rate.is_zero())
+    }
+
+    /// The same at rest.
+    pub fn stopped(self) -> Self {
+        Self { roll: self.roll.map(|_| AngularRate::ZERO), pitch: AngularRate::ZERO, yaw: AngularRate::ZERO, ..self }
+    }
+}
+
 impl RadioControl {
     pub fn of_flags(flags: GimbalFlags) -> Self {
         if flags.contains(GimbalFlags::RC_EXCLUSIVE) {

@@ -103,7 +103,10 @@ impl GimbalManager {
         if primary_changed || source_lost_its_place {
             self.tracking.stop_rates(now);
         }
-        // Who becomes primary finds the camera where it moved it.
+        // Who becomes primary, and who is left, finds the camera where it was moved.
+        if primary_changed {
+            self.tracking.keep_nudge();
+        }
         if self.tracking.nudged_by().is_some_and(|by| !holders.contains(&Some(by))) {
             self.tracking.end_nudge();
         }

@@ -15,12 +15,12 @@ use super::request::{Demand, Refusal};
 use crate::geometry::{Angle, Position, Yaw, YawFrame};
 use crate::gimbals::adapt;
 use crate::gimbals::capabilities::Capabilities;
-use crate::gimbals::setpoint::{Pointing, Setpoint, Stabilised};
+use crate::gimbals::setpoint::{Pointing, Setpoint, Stabilised, Turning};
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 use crate::wire::ids::CapFlags;
 pub use motion::SETTLE;
-use motion::{Motion, Point, Turn, clamp_yaw, is_zero, way};
+use motion::{Motion, Point, Turn, clamp_yaw, way};
 use nudge::Nudge;
 use roi::Roi;
 use situation::Pose;
@@ -142,7 +142,7 @@ impl Tracking {
             self.next = Some(now);
         }
         let stopped = match &mut self.aim {
-            Aim::Turn(turn) if !is_zero(&turn.turning) => {
+            Aim::Turn(turn) if !turn.turning.is_zero() => {
                 turn.stop(now);
                 self.next = Some(now);
                 true
@@ -168,12 +168,32 @@ impl Tracking {
     /// Whether the gimbal is told to turn on and on.
     pub fn is_rotating(&self) -> bool {
         match &self.aim {
-            Aim::Turn(turn) => !is_zero(&turn.turning),
+            Aim::Turn(turn) => !turn.turning.is_zero(),
             Aim::Point(point) => {
                 [point.roll, point.pitch, point.yaw].iter().any(|axis| matches!(axis.motion, Motion::Turning { .. }))
             }
             Aim::Idle | Aim::Retract | Aim::Neutral | Aim::Roi(_) => false,
         }
+    }
+
+    /// The rotation that the device was told last and was not told to stop.
+    pub fn unstopped(&self) -> Option<Turning> {
+        match self.last {
+            Some(Setpoint::Turn(turning)) if !turning.is_zero() => Some(turning),
+            _ => None,
+        }
+    }
+
+    /// The device may still be turning as it was told before it was lost or restarted: it is stopped, and kept where it
+    /// comes to rest.
+    pub fn halt(&mut self, now: Timestamp, turning: Turning) {
+        let turning = Turning { yaw_frame: YawFrame::Vehicle, ..turning };
+        let mut turn = Turn { turning, stops_at: None, settles_at: None };
+        turn.stop(now);
+        self.aim = Aim::Turn(turn);
+        self.source = None;
+        self.carried_to = now;
+        self.next = Some(now);
     }
 
     /// The gimbal is gone: when it comes back it is not moved until somebody asks for it.
@@ -288,7 +308,7 @@ impl Tracking {
             Aim::Idle => None,
             Aim::Retract => Some("retract"),
             Aim::Neutral => Some("neutral"),
-            Aim::Turn(turn) if is_zero(&turn.turning) => Some("hold"),
+            Aim::Turn(turn) if turn.turning.is_zero() => Some("hold"),
             Aim::Turn(_) => Some("rate"),
             Aim::Point(_) => Some("angle"),
             Aim::Roi(_) => Some("roi"),

@@ -264,8 +264,10 @@ impl GimbalDriver for MavlinkV2Driver {
     }
 
     fn handle_setpoint(&mut self, _now: Timestamp, setpoint: Setpoint) {
+        // One that is not heard may still hear that it is to stop.
+        let stops = matches!(setpoint, Setpoint::Turn(turning) if turning.is_zero());
         if let Some(device) = self.device
-            && self.alive
+            && (self.alive || stops)
         {
             self.send(packet::set_attitude(device, &setpoint));
         }

@@ -50,10 +50,6 @@ pub(super) enum Motion {
     },
 }
 
-pub(super) fn is_zero(turning: &Turning) -> bool {
-    [turning.roll.unwrap_or(AngularRate::ZERO), turning.pitch, turning.yaw].iter().all(|rate| rate.is_zero())
-}
-
 impl Turn {
     /// The same rotation as angles that move, from where the gimbal is.
     pub(super) fn in_angles(&self, pose: Pose) -> Point {
@@ -70,12 +66,7 @@ impl Turn {
     }
 
     pub(super) fn stop(&mut self, now: Timestamp) {
-        self.turning = Turning {
-            roll: self.turning.roll.map(|_| AngularRate::ZERO),
-            pitch: AngularRate::ZERO,
-            yaw: AngularRate::ZERO,
-            ..self.turning
-        };
+        self.turning = self.turning.stopped();
         self.stops_at = None;
         self.settles_at = Some(now + SETTLE);
     }
@@ -110,6 +101,14 @@ impl Point {
 }
 
 impl Axis {
+    /// The whole movement by so much.
+    pub(super) fn shift(&mut self, by: Angle) {
+        self.at += by;
+        if let Motion::Slew { to, .. } = &mut self.motion {
+            *to += by;
+        }
+    }
+
     pub(super) const fn still(at: Angle) -> Self {
         Self { at, motion: Motion::Still }
     }

@@ -221,6 +221,18 @@ impl Tracking {
         }
     }
 
+    /// The primary is another one, or nobody: where the secondary moved the camera is where it is told to look from now on.
+    /// Only a place that is looked at goes on to say where that would be.
+    pub fn keep_nudge(&mut self) {
+        if let Aim::Point(point) = &mut self.aim {
+            point.pitch.shift(self.nudge.pitch.at);
+            point.yaw.shift(self.nudge.yaw.at);
+        }
+        if !matches!(self.aim, Aim::Roi(_)) {
+            self.nudge = Nudge { absolute: self.nudge.absolute, ..Nudge::default() };
+        }
+    }
+
     /// Who moves the camera, or has moved it, away from where the primary would look.
     pub fn nudged_by(&self) -> Option<MavId> {
         self.nudge.by

@@ -4,7 +4,7 @@
 //! It ends no angle, no neutral and no retract, however long ago they were asked for: some clients stream zero rates
 //! while nobody touches the stick, and a last one often arrives behind the command that was meant to follow it.
 
-use super::motion::{Axis, Motion, Point, Turn, clamp_yaw, is_zero};
+use super::motion::{Axis, Motion, Point, Turn, clamp_yaw};
 use super::situation::{Pose, Situation};
 use super::{Aim, RateTimeouts, Tracking, neutral};
 use crate::geometry::{Angle, AngularRate, Yaw, YawFrame};
@@ -67,7 +67,7 @@ impl Tracking {
         let reference = self.reference(hold, situation);
         let stands = match &self.aim {
             Aim::Retract | Aim::Neutral => true,
-            Aim::Turn(turn) => is_zero(&turn.turning) && turn.turning.yaw_frame == hold,
+            Aim::Turn(turn) => turn.turning.is_zero() && turn.turning.yaw_frame == hold,
             Aim::Point(point) => !point.moves() && reference.is_none(),
             Aim::Idle | Aim::Roi(_) => false,
         };
@@ -89,7 +89,7 @@ impl Tracking {
                 radio_control,
             };
             let mut turn = Turn { turning, stops_at: until, settles_at: None };
-            if is_zero(&turn.turning) {
+            if turn.turning.is_zero() {
                 turn.stop(now);
             }
             return Ok(Some(Aim::Turn(turn)));

@@ -43,11 +43,17 @@ fn d7_at_the_end_no_demand_follows_the_zero() {
     assert!(world.bridge.is_finished());
 }
 
-/// D9: "no change of … link state moves the camera by itself": a rotation does not outlive a restart of the gimbal, or
-/// its cable.
+/// D7: a rotation does not outlive a restart of the gimbal, its cable, or a time in which it is not heard, also where the
+/// gimbal itself goes on turning: it is told to stop, and then to stay where it looks (D9).
 #[test]
-fn d9_nothing_turns_on_after_a_restart_or_a_pulled_cable() {
-    for restarts in [true, false] {
+fn d7_nothing_turns_on_after_a_restart_a_pulled_cable_or_a_silence() {
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    enum Day {
+        Restart,
+        PulledCable,
+        Silence,
+    }
+    for day in [Day::Restart, Day::PulledCable, Day::Silence] {
         let (mut world, places) = with_gimbal();
         look(&mut world, places, 0.0, 0.0);
         let rate = pitchyaw(NAN, NAN, 0.0, 20.0, 44.0);
@@ -55,22 +61,56 @@ fn d9_nothing_turns_on_after_a_restart_or_a_pulled_cable() {
         run_looking(&mut world, places, SECOND, 0.0, 10.0);
         world.forget();
 
-        if restarts {
-            let status = device_status(gimbald::timestamp::Timestamp::ZERO, 44, 0.0, 10.0);
-            world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status));
-        } else {
-            world.unplug(places.gimbal);
-            assert_eq!(world.snapshot().gimbals[0].state, "lost", "at once");
-            world.run_for(SECOND / 2);
-            world.plug_in(places.gimbal);
-            world.send(places.gimbal, GIMBAL, &gimbal_heartbeat());
+        match day {
+            Day::Restart => {
+                let status = device_status(gimbald::timestamp::Timestamp::ZERO, 44, 0.0, 10.0);
+                world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status));
+            }
+            Day::PulledCable => {
+                world.unplug(places.gimbal);
+                assert_eq!(world.snapshot().gimbals[0].state, "lost", "at once");
+                world.run_for(SECOND / 2);
+                assert_eq!(setpoints(&mut world, places), []);
+                world.plug_in(places.gimbal);
+                world.send(places.gimbal, GIMBAL, &gimbal_heartbeat());
+            }
+            Day::Silence => {
+                world.run_for(4 * SECOND);
+                assert_eq!(world.snapshot().gimbals[0].state, "lost");
+                let told = setpoints(&mut world, places);
+                assert_eq!(rates(&told.last().expect("it may hear us").1), [0.0, 0.0], "and then nothing more");
+                world.send(places.gimbal, GIMBAL, &gimbal_heartbeat());
+            }
         }
+        let back = world.now;
         run_looking(&mut world, places, SECOND, 0.0, 10.0);
 
-        let turning = setpoints(&mut world, places);
-        assert_eq!(turning, [], "restarts: {restarts}");
-        assert_eq!(world.snapshot().gimbals[0].setpoint, None);
+        let told = setpoints(&mut world, places);
+        let (first, stopped) = told.first().expect("it is told to stop");
+        assert_eq!((*first, rates(stopped)), (back, [0.0, 0.0]), "{day:?}");
+        let (_, kept) = told.iter().find(|(_, told)| !told.q[0].is_nan()).expect("and to stay");
+        let (pitch, yaw) = pitch_yaw_deg(kept.q);
+        assert_near(pitch, 0.0, 0.01);
+        assert_near(yaw, 10.0, 0.01);
+        let moves = told.iter().any(|(_, told)| rates(told).iter().any(|rate| !rate.is_nan() && *rate != 0.0));
+        assert!(!moves, "{day:?}: {told:?}");
     }
+}
+
+/// D9: "no change of … link state moves the camera by itself": where it stood still it is told nothing when it is back.
+#[test]
+fn d9_a_gimbal_at_rest_is_told_nothing_when_it_is_back() {
+    let (mut world, places) = with_gimbal();
+    assert_eq!(world.result_of(places.ground, GCS, &pitchyaw(-20.0, 10.0, NAN, NAN, 44.0)), Some(ACCEPTED));
+    run_looking(&mut world, places, SECOND, -20.0, 10.0);
+    world.run_for(4 * SECOND);
+    world.forget();
+
+    world.send(places.gimbal, GIMBAL, &gimbal_heartbeat());
+    run_looking(&mut world, places, SECOND, 0.0, 0.0);
+
+    assert_eq!(setpoints(&mut world, places), []);
+    assert_eq!(world.snapshot().gimbals[0].setpoint, None);
 }
 
 /// D6 and D7: a rate ends with the control of who asked for it, secondary or primary.

@@ -173,6 +173,23 @@ fn a_nudge_stands_still_when_primary_control_changes() {
     }
 }
 
+/// D9: without the primary nobody has it elsewhere: the camera stays where it was moved, also when the secondary goes too.
+#[test]
+fn a_nudge_stays_when_the_primary_goes() {
+    let (mut world, places) = nudged(-10.0, 12.0);
+    assert_eq!(world.result_of(places.ground, GCS, &configure([-3.0, -3.0], [-1.0, -1.0])), Some(ACCEPTED));
+    run(&mut world, places, SECOND, &[]);
+    let release = configure([-1.0, -1.0], [-3.0, -3.0]);
+    assert_eq!(world.result_of(places.autopilot, COMPANION, &release), Some(ACCEPTED));
+    run(&mut world, places, SECOND * 2, &[]);
+    for (_, (pitch, yaw)) in angles(&mut world, places) {
+        assert_near(pitch, -40.0, 0.001);
+        assert_near(yaw, 22.0, 0.001);
+    }
+    let setpoint = world.snapshot().gimbals[0].setpoint.clone().expect("it is kept");
+    assert_eq!((setpoint.nudge_pitch_deg, setpoint.nudge_yaw_deg), (0.0, 0.0));
+}
+
 /// A primary that streams its setpoints, as PX4 does, leaves room for a nudge as long as the secondary makes one.
 #[test]
 fn a_nudge_lasts_while_the_primary_streams() {
