@@ -77,6 +77,8 @@ fn check_endpoints(links: &[Link], http: &Http, problems: &mut Vec<Problem>) {
     for (position, endpoint) in endpoints.iter().enumerate() {
         if let Some(earlier) = endpoints[..position].iter().find(|earlier| collide(&earlier.value, &endpoint.value)) {
             let (what, expected) = match endpoint.value {
+                Endpoint::UdpIn(_) | Endpoint::TcpIn(_) if leaves(&earlier.value) => ("peer", OTHERS_PORT),
+                Endpoint::UdpOut(_) | Endpoint::TcpOut(_) if !leaves(&earlier.value) => ("port", OTHERS_PORT),
                 Endpoint::Serial { .. } => ("serial port", "a serial port of its own"),
                 Endpoint::UdpIn(_) | Endpoint::TcpIn(_) => ("port", "a port of its own"),
                 Endpoint::UdpOut(_) | Endpoint::UdpBroadcast(_) | Endpoint::TcpOut(_) => ("peer", "a peer of its own"),
@@ -96,11 +98,23 @@ fn check_endpoints(links: &[Link], http: &Http, problems: &mut Vec<Problem>) {
     }
 }
 
+/// A link to another link of ours would send round and round what it gets.
+const OTHERS_PORT: &str = "the port of another program at one end";
+
+/// Whether it speaks to a peer that it names.
+fn leaves(endpoint: &Endpoint) -> bool {
+    matches!(endpoint, Endpoint::UdpOut(_) | Endpoint::UdpBroadcast(_) | Endpoint::TcpOut(_))
+}
+
 /// Two links cannot both work.
 fn collide(a: &Endpoint, b: &Endpoint) -> bool {
     match (a, b) {
         (Endpoint::Serial { path: a, .. }, Endpoint::Serial { path: b, .. }) => device(a) == device(b),
         (Endpoint::UdpIn(a), Endpoint::UdpIn(b)) | (Endpoint::TcpIn(a), Endpoint::TcpIn(b)) => same_port(*a, *b),
+        (Endpoint::UdpIn(bound), Endpoint::UdpOut(peer))
+        | (Endpoint::UdpOut(peer), Endpoint::UdpIn(bound))
+        | (Endpoint::TcpIn(bound), Endpoint::TcpOut(peer))
+        | (Endpoint::TcpOut(peer), Endpoint::TcpIn(bound)) => leads_to(*peer, *bound),
         (a, b) => a == b,
     }
 }
@@ -109,6 +123,12 @@ fn collide(a: &Endpoint, b: &Endpoint) -> bool {
 fn device(path: &str) -> PathBuf {
     // A device that is not there yet keeps its name.
     fs::canonicalize(path).unwrap_or_else(|_| PathBuf::from(path))
+}
+
+/// Whether what is sent to `peer` arrives at a port that this computer has bound.
+fn leads_to(peer: SocketAddr, bound: SocketAddr) -> bool {
+    let here = peer.ip() == bound.ip() || (bound.ip().is_unspecified() && peer.ip().is_loopback());
+    peer.port() == bound.port() && here
 }
 
 /// Both cannot be bound; port 0 stands for any free port.

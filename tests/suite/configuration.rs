@@ -370,6 +370,10 @@ fn two_links_cannot_share_a_port() {
         ("serial:/dev/ttyX:57600", "serial:/dev/ttyY:57600", None),
         ("udpout:10.0.0.1:14550",  "udpout:10.0.0.1:14550",  Some("the peer of the link in line 4; expected a peer of its own")),
         ("udpout:10.0.0.1:14550",  "udpout:10.0.0.1:14551",  None),
+        ("udpin:0.0.0.0:14550",    "udpout:127.0.0.1:14550", Some("the port of the link in line 4; expected the port of another program at one end")),
+        ("tcpout:127.0.0.1:5760",  "tcpin:127.0.0.1:5760",   Some("the peer of the link in line 4; expected the port of another program at one end")),
+        ("udpin:0.0.0.0:14550",    "udpout:10.0.0.1:14550",  None),
+        ("udpin:10.0.0.1:14550",   "udpout:127.0.0.1:14550", None),
     ];
     for (first, second, problem) in rows {
         let text = format!("{}{}", LINK.replace("udpin:0.0.0.0:14550", first), {
