@@ -351,6 +351,10 @@ impl Peer for Device {
     }
 
     fn poll_timeout(&self) -> Option<Timestamp> {
+        // Under an id of its own it waits for nobody.
+        if !self.is_speaking && matches!(self.settings.system_id, SystemId::Fixed(_)) {
+            return Some(self.boot);
+        }
         let timeouts = [self.streams.poll_timeout(), self.parameters.poll_timeout(), self.decoder.poll_timeout()];
         timeouts.into_iter().flatten().min()
     }

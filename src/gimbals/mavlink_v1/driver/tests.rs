@@ -219,6 +219,19 @@ fn a_gimbal_that_was_lost_is_told_nothing_until_asked() {
     assert!(matches!(line.reports.last(), Some((_, Report::Attitude(_)))));
 }
 
+/// With a fixed system id it speaks first: over UDP the other side may be waiting for that.
+#[test]
+fn a_gimbal_with_an_id_of_its_own_speaks_first() {
+    let settings = DeviceSettings { system_id: SystemId::Fixed(1), ..DeviceSettings::default() };
+    let mut gimbal = Device::new(Timestamp::ZERO, settings);
+    assert_eq!(gimbal.poll_timeout(), Some(Timestamp::ZERO));
+
+    gimbal.handle_timeout(Timestamp::ZERO);
+
+    let first = gimbal.poll_output().expect("it speaks");
+    assert_eq!(DatagramFrames::new(&first).next_frame().expect("a frame").message_id(), message::HEARTBEAT);
+}
+
 /// "Wait for a HEARTBEAT. Ignore type 6 (GCS) … Adopt that sysid" (gimbal statement 33).
 #[test]
 fn statement_33_a_gimbal_takes_the_system_of_a_vehicle_and_not_of_a_ground_station() {
