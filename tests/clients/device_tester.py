@@ -17,7 +17,7 @@ import pymavlink
 from attitudes import angles_of
 from dialect import mavlink, mavutil
 from ground import FOLLOW, LOCK, NAN, YAW_IN_EARTH_FRAME, YAW_IN_VEHICLE_FRAME, quaternion
-from rig import GIMBALD, LOGS, Process, free_port
+from rig import GIMBALD, LOGS, Process
 from steps import Steps, angle_between, expect, wait_for
 
 ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
@@ -53,13 +53,13 @@ class Tester:
 
     def __enter__(self):
         LOGS.mkdir(parents=True, exist_ok=True)
-        port = free_port()
         self._link = mavutil.mavlink_connection(
-            f"udpin:127.0.0.1:{port}",
+            "udpin:127.0.0.1:0",
             source_system=self._source[0],
             source_component=mavlink.MAV_COMP_ID_AUTOPILOT1,
             robust_parsing=False,
         )
+        port = self._link.port.getsockname()[1]
         arguments = [GIMBALD, "sim", "gimbal", "--endpoint", f"udpout:127.0.0.1:{port}", *self._options]
         self._gimbal = Process("gimbald sim gimbal", arguments, LOGS / f"device-tester-{self._name}.log")
         self._thread.start()
@@ -129,6 +129,11 @@ class Tester:
         """Pitch and yaw of what was reported, as counted from North whatever the flags say."""
         return [angles_of(message.q)[1:] for _, message in self.heard("GIMBAL_DEVICE_ATTITUDE_STATUS", since)]
 
+    def last_attitude(self):
+        """When it came, and pitch and yaw."""
+        at, message = self.heard("GIMBAL_DEVICE_ATTITUDE_STATUS")[-1]
+        return at, *angles_of(message.q)[1:]
+
     def steer(self, flags, q=(NAN,) * 4, rates=(NAN,) * 3):
         """Rates about roll, pitch and yaw in degrees per second."""
         with self._lock:
@@ -171,7 +176,7 @@ class Tester:
         expect(self.information.gimbal_device_id == 0, "the device is no component of its own")
 
     def converges(self):
-        """The camera looks ahead within 20 s, and the gimbal says what it is within 0.3 s of the first setpoint."""
+        """The camera looks ahead within 20 s, and the gimbal says what it is as soon as it is steered."""
         since = time.monotonic()
         self.steer(FOLLOW, quaternion(0, 0))
 
@@ -184,8 +189,12 @@ class Tester:
         source = (status.get_srcSystem(), status.get_srcComponent())
         expect(source == self._source, f"the source is {source}")
         expect((status.target_system, status.target_component) == (0, 0), f"for one alone: {status}")
-        beat = self.first("HEARTBEAT", since, 0.3)
-        expect(beat.type == mavlink.MAV_TYPE_GIMBAL, f"type {beat.type}")
+        # The tester looks for it once the yaw is there, which may be with the first report after the first setpoint.
+        # One that was on its way then may come before.
+        reports = wait_for("three reports", lambda: self.heard("GIMBAL_DEVICE_ATTITUDE_STATUS", since)[2:], 5)
+        beats = [beat for at, beat in self.heard("HEARTBEAT", since) if at < reports[0][0]]
+        expect(beats, "no HEARTBEAT before the third report")
+        expect(beats[0].type == mavlink.MAV_TYPE_GIMBAL, f"type {beats[0].type}")
 
     def limits(self):
         told = self.information
@@ -238,11 +247,13 @@ class Tester:
         self.angle(FOLLOW, 0, 0)
 
     def rate(self, pitch, yaw, seconds):
-        before, started = self.attitudes()[-1], time.monotonic()
+        _, *before = self.last_attitude()
+        started = time.monotonic()
         self.steer(FOLLOW, rates=(0, pitch, yaw))
         time.sleep(seconds)
-        after, lasted = self.attitudes()[-1], time.monotonic() - started
         self.check()
+        seen, *after = self.last_attitude()
+        lasted = seen - started
         for axis, rate, was, at in zip(("pitch", "yaw"), (pitch, yaw), before, after):
             wanted = was + rate * lasted
             reason = f"{axis} is {at:.1f}° instead of {wanted:.1f}° after {lasted:.2f} s"
@@ -269,13 +280,14 @@ class Tester:
     def angle_and_rate(self):
         self.angle(FOLLOW, 0, 0)
         for pitch, rate, seconds in ((-20, -10, 2.0), (0, 5, 4.0)):
-            before, started = self.attitudes()[-1][0], time.monotonic()
+            _, before, _ = self.last_attitude()
+            started = time.monotonic()
             self.steer(FOLLOW, quaternion(pitch, 0), (0, rate, 0))
             for part in ("half-way", "at the end"):
                 time.sleep(seconds / 2)
-                lasted = min(time.monotonic() - started, seconds)
-                wanted, at = before + rate * lasted, self.attitudes()[-1][0]
                 self.check()
+                seen, at, _ = self.last_attitude()
+                wanted = before + rate * min(seen - started, seconds)
                 expect(abs(at - wanted) <= TOLERANCE, f"pitch is {at:.1f}° instead of {wanted:.1f}° {part}")
             self.stop()
         self.angle(FOLLOW, 0, 0)
@@ -286,15 +298,15 @@ class Tester:
         """While yaw is locked the vehicle turns under the camera, and the camera does not turn with it."""
         self.angle(LOCK, -10, 20)
         since, heading = time.monotonic(), self._heading
-        self.turning(45)
-        time.sleep(2)
+        self.turning(20)
+        time.sleep(3)
         self.turning(0)
         time.sleep(0.3)
         self.check()
         off = [yaw for _, yaw in self.attitudes(since) if angle_between(yaw, 20) > TOLERANCE]
         expect(not off, f"the camera turned with the vehicle: {off}")
         turned = self._heading - heading
-        expect(turned > 80, f"the vehicle turned only {turned:.0f}°")
+        expect(turned > 50, f"the vehicle turned only {turned:.0f}°")
 
     def honest(self, frame):
         """Flags, quaternion and delta_yaw say one thing, in the frame that was asked for."""
@@ -330,10 +342,13 @@ class Tester:
 
     def rhythm(self):
         """285 comes four times a second before the first setpoint."""
-        since = time.monotonic()
-        time.sleep(2)
-        count = len(self.attitudes(since))
-        expect(7 <= count <= 9, f"{count} in 2 s")
+        def reports():
+            told = self.heard("GIMBAL_DEVICE_ATTITUDE_STATUS")
+            return len(told) >= 8 and told
+
+        times = [message.time_boot_ms for _, message in wait_for("eight reports", reports, 5)]
+        gaps = sorted(after - before for before, after in zip(times, times[1:]))
+        expect(240 <= gaps[len(gaps) // 2] <= 260, f"after {gaps} ms")
 
 
 def fast(name, system_id, component_id, *options):
