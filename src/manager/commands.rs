@@ -202,7 +202,8 @@ fn unsupported(number: u16) -> Refusal {
         command::DO_SET_ROI_SYSID => "do_set_roi_sysid_unsupported",
         command::DO_SET_ROI => "do_set_roi_unsupported",
         command::DO_MOUNT_CONTROL_QUAT => "do_mount_control_quat_unsupported",
-        command::PREFLIGHT_REBOOT_SHUTDOWN => "preflight_reboot_shutdown_unsupported",
+        // Known, and never done for anybody.
+        command::PREFLIGHT_REBOOT_SHUTDOWN => return Refusal::denied("preflight_reboot_shutdown_denied"),
         command::DO_GIMBAL_MANAGER_TRACK_RECTANGLE => "do_gimbal_manager_track_rectangle_unsupported",
         command::REQUEST_OPERATOR_CONTROL => "request_operator_control_unsupported",
         command::GIMBAL_RESET => "gimbal_reset_unsupported",

@@ -40,21 +40,21 @@ fn items_128_and_138_what_we_do_not_do_is_refused_by_name() {
     let (mut world, places) = with_gimbal();
     turn_vehicle(&mut world, places, 0.0);
     let named = [
-        (196,    "do_set_roi_wpnext_offset_unsupported"),
-        (198,    "do_set_roi_sysid_unsupported"),
-        (201,    "do_set_roi_unsupported"),
-        (220,    "do_mount_control_quat_unsupported"),
-        (246,    "preflight_reboot_shutdown_unsupported"),
-        (1002,   "do_gimbal_manager_track_rectangle_unsupported"),
-        (32_100, "request_operator_control_unsupported"),
-        (42_501, "gimbal_reset_unsupported"),
+        (196,    UNSUPPORTED, "do_set_roi_wpnext_offset_unsupported"),
+        (198,    UNSUPPORTED, "do_set_roi_sysid_unsupported"),
+        (201,    UNSUPPORTED, "do_set_roi_unsupported"),
+        (220,    UNSUPPORTED, "do_mount_control_quat_unsupported"),
+        (246,    DENIED,      "preflight_reboot_shutdown_denied"),
+        (1002,   UNSUPPORTED, "do_gimbal_manager_track_rectangle_unsupported"),
+        (32_100, UNSUPPORTED, "request_operator_control_unsupported"),
+        (42_501, UNSUPPORTED, "gimbal_reset_unsupported"),
     ];
-    for (number, reason) in named {
+    for (number, result, reason) in named {
         for params in [[0.0; 7], [1.0; 7], [NAN; 7], [3.0, 0.0, 0.0, 0.0, 47.4, 8.5, 400.0]] {
             let by_long = command_long(MANAGER, number, &params);
             let by_int = command_int(MANAGER, number, [params[0]; 4], 474_000_000, 85_000_000, 400.0);
             for command in [by_long, by_int] {
-                assert_eq!(world.result_of(places.ground, GCS, &command), Some(UNSUPPORTED), "{command:?}");
+                assert_eq!(world.result_of(places.ground, GCS, &command), Some(result), "{command:?}");
                 for target in [MavId::new(1, 0), MavId::new(0, 0)] {
                     let to_everybody = world.ask(places.ground, GCS, &to(target, command.clone()));
                     assert_eq!(to_everybody, [], "{target} {number}");
