@@ -258,8 +258,8 @@ mod tests {
     use std::net::{Ipv4Addr, SocketAddr, TcpListener};
     use std::os::fd::{AsFd, OwnedFd};
     use std::os::unix::fs::symlink;
-    use std::sync::LazyLock;
     use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
+    use std::sync::{Arc, LazyLock, Mutex};
     use std::thread::JoinHandle;
     use std::time::Duration;
 
@@ -274,15 +274,40 @@ mod tests {
     use crate::sim::peer::Peer;
     use crate::sim::vehicle::{Vehicle, VehicleSettings};
     use crate::timestamp::Timestamp;
-    use crate::wire::StreamDecoder;
+
+    /// What a scan says of its progress, as it says it.
+    #[derive(Clone, Default)]
+    struct Said(Arc<Mutex<Vec<u8>>>);
+
+    impl Said {
+        fn text(&self) -> String {
+            String::from_utf8(self.0.lock().expect("no panic").clone()).expect("text")
+        }
+
+        /// How many baud rates were set so far.
+        fn attempts(&self) -> usize {
+            self.text().matches(" baud …\n").count()
+        }
+    }
+
+    impl Write for Said {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.0.lock().expect("no panic").write(bytes)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
 
     /// A peer behind a pseudo-terminal, which understands one of the baud rates that are tried, counted from one.
     ///
-    /// A pseudo-terminal passes bytes on at any rate; each attempt begins with a frame of sequence number 0.
+    /// A pseudo-terminal passes bytes on at any rate; the scan says which one is set.
     struct Plugged {
         path: PathBuf,
         /// Never opened by the peer, but there for as long as it is.
         far: Option<OwnedFd>,
+        said: Said,
         stop: Sender<()>,
         thread: JoinHandle<usize>,
     }
@@ -293,32 +318,37 @@ mod tests {
             fcntl(pty.master.as_fd(), FcntlArg::F_SETFL(OFlag::O_NONBLOCK)).expect("it takes the flag");
             let path = ttyname(&pty.slave).expect("it has a name");
             let (stop, stopped) = channel();
-            let thread = std::thread::spawn(move || live(peer, &pty.master, understood, &stopped));
-            Self { path, far: Some(pty.slave), stop, thread }
+            let said = Said::default();
+            let heard = said.clone();
+            let thread =
+                std::thread::spawn(move || live(peer, &pty.master, || heard.attempts() == understood, &stopped));
+            Self { path, far: Some(pty.slave), said, stop, thread }
         }
 
-        /// Takes the peer away: at how many baud rates it was spoken to.
+        /// Scans the port under the name `path`: what came of it, what was found, what was said.
+        fn scan(&self, path: &Path, daemon: &str) -> (Result<(), ScanError>, String, String) {
+            let mut output = Vec::new();
+            let result = run(Some(path), daemon, &mut output, &mut self.said.clone());
+            (result, String::from_utf8(output).expect("text"), self.said.text())
+        }
+
+        /// Takes the peer away: how many bytes it was sent.
         fn end(self) -> usize {
             self.stop.send(()).expect("it still lives");
             self.thread.join().expect("no panic")
         }
     }
 
-    fn live(mut peer: impl Peer, line: &OwnedFd, understood: usize, stopped: &Receiver<()>) -> usize {
+    fn live(mut peer: impl Peer, line: &OwnedFd, understands: impl Fn() -> bool, stopped: &Receiver<()>) -> usize {
         let clock = Clock::start();
-        let mut attempts = 0;
+        let mut received = 0;
         let mut buffer = [0; 1024];
-        // A read may end inside a frame.
-        let mut frames = StreamDecoder::default();
         while stopped.try_recv() == Err(TryRecvError::Empty) {
             let now = clock.now();
             match read(line, &mut buffer) {
                 Ok(length) => {
-                    frames.push(now, &buffer[..length]);
-                    while let Some(frame) = frames.next_frame() {
-                        attempts += usize::from(frame.sequence() == 0);
-                    }
-                    if attempts == understood {
+                    received += length;
+                    if understands() {
                         peer.handle_received(now, &buffer[..length]);
                     }
                 }
@@ -327,15 +357,14 @@ mod tests {
             }
             peer.handle_timeout(now);
             while let Some(bytes) = peer.poll_output() {
-                let heard = if attempts == understood { &bytes[..] } else { &[0x55; 16] };
+                let heard = if understands() { &bytes[..] } else { &[0x55; 16] };
                 assert_eq!(write(line, heard), Ok(heard.len()));
             }
             std::thread::sleep(Duration::from_millis(2));
         }
-        attempts
+        received
     }
 
-    /// An address where no daemon answers.
     /// A port where nobody listens, and that nobody else can get while the tests run.
     fn no_daemon() -> String {
         static TAKEN: LazyLock<Socket> = LazyLock::new(|| {
@@ -363,7 +392,7 @@ mod tests {
         let path = folder.path().join("by id:gimbal");
         symlink(&gimbal.path, &path).expect("a link");
 
-        let (result, output, errors) = scan_at(&path, &no_daemon());
+        let (result, output, errors) = gimbal.scan(&path, &no_daemon());
 
         result.expect("it answers");
         let shown = path.display();
@@ -373,7 +402,7 @@ mod tests {
         );
         assert_eq!(output, expected);
         assert_eq!(errors, format!("{shown}: 115200 baud …\n{shown}: 921600 baud …\n"));
-        assert_eq!(gimbal.end(), 2);
+        gimbal.end();
     }
 
     #[test]
@@ -381,7 +410,7 @@ mod tests {
         let time = Timestamp::ZERO;
         let autopilot = Plugged::new(Vehicle::new(time, VehicleSettings::default()), 1);
 
-        let (result, output, _) = scan_at(&autopilot.path, &no_daemon());
+        let (result, output, _) = autopilot.scan(&autopilot.path, &no_daemon());
 
         result.expect("it answers");
         let shown = autopilot.path.display();
@@ -415,7 +444,7 @@ mod tests {
 
         // An open far end would hide that somebody else opens and closes it.
         gimbal.far = None;
-        let (result, output, errors) = scan_at(&gimbal.path, &daemon);
+        let (result, output, errors) = gimbal.scan(&gimbal.path, &daemon);
 
         server.join().expect("no panic");
         let error = result.expect_err("left alone");

@@ -118,9 +118,10 @@ fn whoever_is_in_the_way_is_named() {
 
     let found = holders(address.port());
 
-    assert_eq!(found.len(), 1, "{found:?}");
-    assert!(found[0].ends_with(&format!("({})", std::process::id())), "{found:?}");
+    // A process that another test starts has our sockets as well, for as long as it is not yet its own program.
+    let us = format!(" ({})", std::process::id());
+    let us = found.iter().find(|holder| holder.ends_with(&us)).unwrap_or_else(|| panic!("{found:?}"));
     let refusal = std::panic::catch_unwind(|| require_free_udp(address)).expect_err("it is held");
     let text = refusal.downcast_ref::<String>().expect("it says something");
-    assert!(text.contains(&found[0]), "{text}");
+    assert!(text.contains(us), "{text}");
 }
