@@ -31,6 +31,8 @@ mod transactions;
 
 pub use crate::channel::{ChannelId, ChannelSet};
 use crate::gimbals::DriverOutput;
+use crate::gimbals::operation::{OperationId, OperationResult};
+use crate::gimbals::report::Report;
 use crate::manager::rank::Ranks;
 use crate::manager::{ManagerOutput, Surroundings};
 use crate::router::Router;
@@ -98,6 +100,8 @@ pub enum Output<'a> {
     Transmit { channels: ChannelSet, bytes: &'a [u8] },
     /// Keep the adopted system id for the next start.
     StoreSystemId(u8),
+    /// What became of an operation.
+    Operated { id: OperationId, result: &'a OperationResult },
 }
 
 /// The core.
@@ -442,8 +446,14 @@ impl Bridge {
                         self.transactions.send(now, order);
                     }
                     GimbalOutput::Driver(DriverOutput::Report(report)) => {
+                        if report == Report::SpeaksForItself(false) {
+                            self.roster.keep_number(at);
+                        }
                         let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
                         self.roster.get_mut(at).manager.handle_report(now, report, around);
+                    }
+                    GimbalOutput::Driver(DriverOutput::Operated { id, result }) => {
+                        self.outbox.push_operated(id, result)
                     }
                     GimbalOutput::Manager(output) => self.carry_out_for_manager(now, at, component, output),
                 }

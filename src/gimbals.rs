@@ -2,9 +2,11 @@
 
 pub mod adapt;
 pub mod capabilities;
+pub mod details;
 pub mod driver;
 pub mod mavlink_v1;
 pub mod mavlink_v2;
+pub mod operation;
 pub mod report;
 pub mod setpoint;
 pub mod settings;

@@ -137,6 +137,8 @@ pub struct GimbalManager {
     information_schedule: Schedule,
     /// What it says for a gimbal that is no v2 device.
     voice: Option<DeviceVoice>,
+    /// The device id of the gimbal if it is none.
+    number: Option<u8>,
     /// When whose demand is being carried out was last heard.
     source_heard: Timestamp,
     heading_bias: HeadingBias,
@@ -155,8 +157,9 @@ pub struct GimbalManager {
 }
 
 impl GimbalManager {
-    /// `voice`: where the gimbal is no v2 device.
-    pub fn new(settings: GimbalSettings, rules: ControlSettings, voice: Option<DeviceVoice>) -> Self {
+    /// `number`: the device id that is kept for the gimbal in case that it is no v2 device, 1 to 6.
+    pub fn new(settings: GimbalSettings, rules: ControlSettings, number: Option<u8>) -> Self {
+        let always_spoken_for = settings.family.speaks_through_manager();
         Self {
             tracking: Tracking::new(settings.setpoint_rate_hz),
             settings,
@@ -171,7 +174,8 @@ impl GimbalManager {
             control: Control::default(),
             status_schedule: Schedule::new(Interval::Every(DEFAULT_STATUS_INTERVAL)),
             information_schedule: Schedule::new(Interval::Off),
-            voice,
+            voice: number.filter(|_| always_spoken_for).map(DeviceVoice::new),
+            number,
             source_heard: Timestamp::ZERO,
             heading_bias: HeadingBias::default(),
             primary_demand: None,
@@ -255,6 +259,7 @@ impl GimbalManager {
                 self.state = DeviceState::Alive;
                 self.tell(if known { Event::Back { device } } else { Event::Found { device } });
             }
+            Report::SpeaksForItself(itself) => self.speak_for_device(now, !itself),
             Report::Known(identity, capabilities) => {
                 let changed = self.identity != identity || self.capabilities != Some(capabilities);
                 self.identity = identity;
@@ -297,6 +302,20 @@ impl GimbalManager {
             }
         }
         self.carry_out(now, around);
+    }
+
+    /// From now on speaks for the gimbal, or leaves that to the gimbal itself.
+    fn speak_for_device(&mut self, now: Timestamp, speaks: bool) {
+        if self.voice.is_some() == speaks {
+            return;
+        }
+        self.voice = self.number.filter(|_| speaks).map(|number| {
+            let mut voice = DeviceVoice::new(number);
+            for channel in self.status_schedule.channels() {
+                voice.schedule.open(now, channel);
+            }
+            voice
+        });
     }
 
     /// More, or less, may be known of the vehicle.
@@ -385,6 +404,16 @@ impl GimbalManager {
     /// The gimbal device id of 280 and 281: a v2 device's component id, any other gimbal's number.
     pub fn device_id(&self) -> Option<u8> {
         self.device.map(|device| self.number().unwrap_or(device.component))
+    }
+
+    /// Keeps a device id for the gimbal in case that it turns out to be no v2 device.
+    pub fn keep_number(&mut self, number: u8) {
+        self.number = Some(number);
+    }
+
+    /// The device id that is kept, whether it is used or not.
+    pub fn kept_number(&self) -> Option<u8> {
+        self.number
     }
 
     /// 1 to 6 where the gimbal is no v2 device.

@@ -142,6 +142,7 @@ impl Bridge {
             }),
             flags: gimbal_flag_names(manager.flags()),
             failure_flags: failure_flag_names(failures),
+            details: gimbal.driver.details(now),
             rejected: manager
                 .rejected()
                 .iter()

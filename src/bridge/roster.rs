@@ -17,7 +17,7 @@ use crate::gimbals::mavlink_v2::MavlinkV2Driver;
 use crate::gimbals::settings::{Family, GimbalSettings};
 use crate::gimbals::{DriverOutput, GimbalDriver};
 use crate::manager::settings::ControlSettings;
-use crate::manager::voice::{self, DeviceVoice};
+use crate::manager::voice;
 use crate::manager::{GimbalManager, ManagerOutput};
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
@@ -48,7 +48,7 @@ pub struct Gimbal {
 }
 
 impl Gimbal {
-    /// `number`: its device id where it is no v2 device.
+    /// `number`: the device id that is kept for it in case that it is no v2 device.
     fn new(
         settings: GimbalSettings,
         rules: &ControlSettings,
@@ -61,7 +61,7 @@ impl Gimbal {
             Family::MavlinkV1 => Box::new(MavlinkV1Driver::new(settings.v1_sign)),
         };
         Self {
-            manager: GimbalManager::new(settings, rules.clone(), number.map(DeviceVoice::new)),
+            manager: GimbalManager::new(settings, rules.clone(), number),
             driver,
             adopted: None,
             channel: None,
@@ -78,7 +78,7 @@ impl Gimbal {
     /// What it was told and what it said is forgotten, and it is looked for as in the beginning.
     fn start_over(&mut self, rules: &ControlSettings, open: ChannelSet, now: Timestamp) {
         let settings = self.manager.settings().clone();
-        *self = Self::new(settings, rules, self.component, self.configured, self.manager.number());
+        *self = Self::new(settings, rules, self.component, self.configured, self.manager.kept_number());
         for channel in open {
             self.manager.open_channel(now, channel);
         }
@@ -185,6 +185,18 @@ impl Roster {
 
     pub fn get_mut(&mut self, at: usize) -> &mut Gimbal {
         &mut self.gimbals[at]
+    }
+
+    /// Keeps the next free device id for a gimbal that turned out to be no v2 device. The seventh has none, and so is not
+    /// told of.
+    pub fn keep_number(&mut self, at: usize) {
+        if self.gimbals[at].manager.kept_number().is_some() {
+            return;
+        }
+        let kept = |number: &u8| self.gimbals.iter().any(|gimbal| gimbal.manager.kept_number() == Some(*number));
+        if let Some(number) = (1..=voice::LAST_NUMBER).find(|number| !kept(number)) {
+            self.gimbals[at].manager.keep_number(number);
+        }
     }
 
     /// Every manager tells of its gimbal on `channel` from now on.

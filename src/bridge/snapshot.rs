@@ -6,6 +6,8 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::gimbals::details::GimbalDetails;
+
 /// The content of `/api/v1/status`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Snapshot {
@@ -139,6 +141,9 @@ pub struct GimbalSnapshot {
     pub failure_flags: Vec<String>,
     /// Sender to reason to count: what was refused.
     pub rejected: BTreeMap<String, BTreeMap<String, u64>>,
+    /// What only its family knows of it.
+    #[serde(default)]
+    pub details: GimbalDetails,
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

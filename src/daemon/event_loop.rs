@@ -184,6 +184,7 @@ impl Ports {
                     }
                 }
                 Output::StoreSystemId(id) => self.system_id_file.store(id),
+                Output::Operated { .. } => {}
             }
         }
     }

@@ -1,5 +1,7 @@
 //! The one trait behind which every gimbal family stands.
 
+use super::details::GimbalDetails;
+use super::operation::{Operation, OperationId, OperationResult};
 use super::report::Report;
 use super::setpoint::Setpoint;
 use crate::timestamp::Timestamp;
@@ -25,11 +27,18 @@ pub trait GimbalDriver: std::fmt::Debug {
     /// What became of a command that the driver gave out ([`DriverOutput::Command`]).
     fn handle_command_outcome(&mut self, now: Timestamp, command: &COMMAND_LONG_DATA, outcome: CommandOutcome);
 
+    /// What somebody who may asks of it; each is answered by exactly one [`DriverOutput::Operated`], at once or when the
+    /// gimbal has done it or given no answer.
+    fn handle_operation(&mut self, now: Timestamp, id: OperationId, operation: Operation);
+
     fn handle_timeout(&mut self, now: Timestamp);
 
     fn poll_output(&mut self) -> Option<DriverOutput>;
 
     fn poll_timeout(&self) -> Option<Timestamp>;
+
+    /// What only its family knows of it; asked when somebody looks.
+    fn details(&self, now: Timestamp) -> GimbalDetails;
 }
 
 /// What a driver wants done.
@@ -40,6 +49,11 @@ pub enum DriverOutput {
     /// The same for a command to one component, which is sent again until it is answered.
     Command(Box<COMMAND_LONG_DATA>),
     Report(Report),
+    /// What became of an operation.
+    Operated {
+        id: OperationId,
+        result: OperationResult,
+    },
 }
 
 /// What became of a command of ours.

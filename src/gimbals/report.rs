@@ -14,6 +14,9 @@ pub enum Report {
     },
     /// It was restarted, and does not do any more what it was told before.
     Restarted,
+    /// Whether it is a v2 device, which tells clients itself what it is and where it looks. One that is none is spoken
+    /// for by its manager.
+    SpeaksForItself(bool),
     /// Enough is known of the device to steer it, or something of that has changed.
     Known(Identity, Capabilities),
     Attitude(GimbalStatus),

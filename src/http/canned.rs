@@ -6,6 +6,7 @@ use crate::bridge::snapshot::{
     AttitudeSnapshot, EventSnapshot, GimbalSnapshot, LinkSnapshot, PeerSnapshot, RoiSnapshot, SetpointSnapshot,
     Snapshot, VehicleSnapshot,
 };
+use crate::gimbals::details::GimbalDetails;
 
 /// Two links, of which one is down; one gimbal that is held, and one that is searched for.
 pub fn snapshot() -> Snapshot {
@@ -111,6 +112,11 @@ fn held_gimbal() -> GimbalSnapshot {
         flags: vec!["yaw_lock".into(), "roll_lock".into()],
         failure_flags: vec!["motor_error".into()],
         rejected: BTreeMap::from([("1/100".into(), BTreeMap::from([("not_in_control".into(), 12)]))]),
+        details: GimbalDetails {
+            generation: Some("v2".into()),
+            faults: vec!["firmware 7.8.7 reports a wrong yaw from North".into()],
+            parameters: BTreeMap::from([("RC_TYPE".into(), 7.0)]),
+        },
     }
 }
 

@@ -65,6 +65,10 @@ fn status_is_the_whole_snapshot() {
                 "roi": {"latitude_deg": 47.4, "longitude_deg": 8.55, "altitude_amsl_m": 430.0},
                 "flags": ["yaw_lock", "roll_lock"], "failure_flags": ["motor_error"],
                 "rejected": {"1/100": {"not_in_control": 12}},
+                "details": {
+                    "generation": "v2", "faults": ["firmware 7.8.7 reports a wrong yaw from North"],
+                    "parameters": {"RC_TYPE": 7.0},
+                },
             },
             {
                 "name": "lamp", "configured": true, "family": "auto", "manager_component_id": 192, "device_id": null,
@@ -75,6 +79,7 @@ fn status_is_the_whole_snapshot() {
                 "setpoint": null, "primary": null, "secondary": null, "primary_age_ms": null, "secondary_age_ms": null,
                 "lender": null, "takeover": "open", "roi": null,
                 "flags": [], "failure_flags": [], "rejected": {},
+                "details": {"generation": null, "faults": [], "parameters": {}},
             },
         ],
         "conflicts": ["1/191 is also used by 10.0.0.7: set its component id to another value"],

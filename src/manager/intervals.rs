@@ -77,6 +77,10 @@ impl Schedule {
         self.entries.iter().find(|entry| entry.channel == channel).map_or(self.default, |entry| entry.interval)
     }
 
+    pub fn channels(&self) -> impl Iterator<Item = ChannelId> {
+        self.entries.iter().map(|entry| entry.channel)
+    }
+
     pub fn poll_timeout(&self) -> Option<Timestamp> {
         self.entries.iter().filter(|entry| matches!(entry.interval, Interval::Every(_))).map(|entry| entry.due).min()
     }

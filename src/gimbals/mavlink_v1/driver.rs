@@ -9,7 +9,9 @@ use std::time::Duration;
 use super::packet::{self, MountControl, Signs};
 use crate::geometry::{Angle, AngularRate, Attitude, AxisLimits, GimbalAngles, Limits, VehicleFrame};
 use crate::gimbals::capabilities::Capabilities;
+use crate::gimbals::details::GimbalDetails;
 use crate::gimbals::driver::{CommandOutcome, DriverOutput, GimbalDriver};
+use crate::gimbals::operation::{Operation, OperationError, OperationId};
 use crate::gimbals::report::{GimbalAttitude, GimbalStatus, Identity, Report};
 use crate::gimbals::setpoint::Setpoint;
 use crate::timers::TimerTable;
@@ -282,6 +284,10 @@ impl GimbalDriver for MavlinkV1Driver {
     /// It gives out none.
     fn handle_command_outcome(&mut self, _now: Timestamp, _command: &COMMAND_LONG_DATA, _outcome: CommandOutcome) {}
 
+    fn handle_operation(&mut self, _now: Timestamp, id: OperationId, _operation: Operation) {
+        self.outputs.push_back(DriverOutput::Operated { id, result: Err(OperationError::Unsupported) });
+    }
+
     fn handle_timeout(&mut self, now: Timestamp) {
         while let Some(timer) = self.timers.pop_due(now) {
             match timer {
@@ -304,6 +310,10 @@ impl GimbalDriver for MavlinkV1Driver {
 
     fn poll_timeout(&self) -> Option<Timestamp> {
         self.timers.next().map(|(at, _)| at)
+    }
+
+    fn details(&self, _now: Timestamp) -> GimbalDetails {
+        GimbalDetails::default()
     }
 }
 

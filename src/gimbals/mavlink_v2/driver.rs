@@ -8,7 +8,9 @@ use std::time::Duration;
 use super::packet::{self, DeviceStatus};
 use crate::geometry::Angle;
 use crate::gimbals::capabilities::Capabilities;
+use crate::gimbals::details::GimbalDetails;
 use crate::gimbals::driver::{CommandOutcome, DriverOutput, GimbalDriver};
+use crate::gimbals::operation::{Operation, OperationError, OperationId};
 use crate::gimbals::report::{GimbalStatus, Identity, Report};
 use crate::gimbals::setpoint::Setpoint;
 use crate::timers::TimerTable;
@@ -281,6 +283,10 @@ impl GimbalDriver for MavlinkV2Driver {
         }
     }
 
+    fn handle_operation(&mut self, _now: Timestamp, id: OperationId, _operation: Operation) {
+        self.outputs.push_back(DriverOutput::Operated { id, result: Err(OperationError::Unsupported) });
+    }
+
     fn handle_timeout(&mut self, now: Timestamp) {
         while let Some(timer) = self.timers.pop_due(now) {
             match timer {
@@ -301,5 +307,9 @@ impl GimbalDriver for MavlinkV2Driver {
 
     fn poll_timeout(&self) -> Option<Timestamp> {
         self.timers.next().map(|(at, _)| at)
+    }
+
+    fn details(&self, _now: Timestamp) -> GimbalDetails {
+        GimbalDetails::default()
     }
 }

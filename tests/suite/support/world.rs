@@ -9,6 +9,7 @@ use gimbald::bridge::settings::{LinkSettings, Role, Settings, SystemId, Transpor
 use gimbald::bridge::snapshot::Snapshot;
 use gimbald::bridge::{Bridge, ChannelId, Input, Output};
 use gimbald::gimbals::mavlink_v2::sim::{Device, DeviceSettings};
+use gimbald::gimbals::operation::{OperationId, OperationResult};
 use gimbald::sim::peer::{Peer, PlatformMotion};
 use gimbald::sim::vehicle::{Vehicle, VehicleSettings};
 use gimbald::timestamp::Timestamp;
@@ -70,6 +71,8 @@ pub struct World {
     is_running: bool,
     ends: Vec<End>,
     pub stored_system_ids: Vec<u8>,
+    /// What became of operations.
+    pub operated: Vec<(OperationId, OperationResult)>,
 }
 
 impl World {
@@ -78,8 +81,14 @@ impl World {
     pub fn new(settings: Settings) -> (Self, Vec<Place>) {
         let links = settings.links.len();
         let bridge = Bridge::new(Timestamp::ZERO, settings);
-        let mut world =
-            Self { now: Timestamp::ZERO, bridge, is_running: true, ends: Vec::new(), stored_system_ids: Vec::new() };
+        let mut world = Self {
+            now: Timestamp::ZERO,
+            bridge,
+            is_running: true,
+            ends: Vec::new(),
+            stored_system_ids: Vec::new(),
+            operated: Vec::new(),
+        };
         let mut places = Vec::new();
         for link in 0..links {
             world.input(Input::LinkUp { link });
@@ -284,6 +293,10 @@ impl World {
                 Output::Transmit { channels, bytes } => (channels, bytes.to_vec()),
                 Output::StoreSystemId(system) => {
                     self.stored_system_ids.push(system);
+                    continue;
+                }
+                Output::Operated { id, result } => {
+                    self.operated.push((id, result.clone()));
                     continue;
                 }
             };

@@ -65,6 +65,7 @@ impl Line {
                         }
                     }
                     DriverOutput::Command(command) => panic!("{command:?} waits for an answer"),
+                    DriverOutput::Operated { .. } => panic!("nothing was asked"),
                     DriverOutput::Report(report) => self.reports.push((self.now, report)),
                 }
             }
