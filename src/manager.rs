@@ -15,11 +15,13 @@ pub mod tracking;
 pub mod voice;
 
 mod commands;
+mod device;
 mod heading;
 mod inquiries;
 mod mount;
 mod ownership;
 mod roi;
+mod telling;
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
@@ -27,13 +29,13 @@ use std::time::Duration;
 use crate::channel::{ChannelId, ChannelSet};
 use crate::geometry::{Angle, Position};
 use crate::gimbals::capabilities::Capabilities;
-use crate::gimbals::report::{GimbalStatus, Identity, Report};
+use crate::gimbals::report::{GimbalStatus, Identity};
 use crate::gimbals::setpoint::{Setpoint, Turning};
 use crate::gimbals::settings::GimbalSettings;
 use crate::timestamp::Timestamp;
 use crate::vehicle::Vehicle;
 use crate::wire::dialect::MavMessage;
-use crate::wire::ids::{CommandResult, FailureFlags, GimbalFlags};
+use crate::wire::ids::GimbalFlags;
 use crate::wire::{MavId, Target};
 use commands::LastCommand;
 use control::{Control, Voice};
@@ -45,6 +47,7 @@ use mount::ConfiguredInputs;
 use rank::Ranks;
 use request::{Demand, DemandKind, Refusal, Request};
 use settings::ControlSettings;
+use telling::can_aim;
 use tracking::{RateTimeouts, Situation, Tracking};
 use voice::DeviceVoice;
 
@@ -226,98 +229,6 @@ impl GimbalManager {
         self.carry_out(now, around);
     }
 
-    /// News from the driver.
-    pub fn handle_report(&mut self, now: Timestamp, report: Report, around: Surroundings<'_>) {
-        if !matches!(report, Report::Attitude(_) | Report::Malformed { .. }) {
-            self.last_command = None;
-        }
-        match report {
-            Report::Restarted => {
-                // Its clock may have jumped while it goes on turning.
-                let unstopped = self.tracking.unstopped();
-                self.tracking.forget();
-                if let Some(turning) = unstopped {
-                    self.tracking.halt(now, turning);
-                }
-                self.heading_bias = HeadingBias::default();
-                self.tell(Event::Restarted { device: self.device });
-            }
-            Report::Alive { device } => {
-                if self.device != Some(device) {
-                    self.tracking.forget();
-                    self.heading_bias = HeadingBias::default();
-                    self.identity = Identity::default();
-                    self.capabilities = None;
-                    self.status = None;
-                    self.told_attitude = None;
-                    self.unstopped = None;
-                }
-                if let Some(turning) = self.unstopped.take() {
-                    self.tracking.halt(now, turning);
-                }
-                let known = self.device.replace(device) == Some(device);
-                self.state = DeviceState::Alive;
-                self.tell(if known { Event::Back { device } } else { Event::Found { device } });
-            }
-            Report::SpeaksForItself(itself) => self.speak_for_device(now, !itself),
-            Report::Known(identity, capabilities) => {
-                let changed = self.identity != identity || self.capabilities != Some(capabilities);
-                self.identity = identity;
-                self.capabilities = Some(capabilities);
-                if changed {
-                    let (vendor, model) = (&self.identity.vendor, &self.identity.model);
-                    tracing::info!(gimbal = self.settings.name, vendor, model, "gimbal known");
-                    self.announce(now, around);
-                }
-            }
-            Report::Attitude(status) => {
-                if let Some(of_gimbal) = status.heading {
-                    self.heading_bias.handle_heading(now, of_gimbal, around.vehicle.heading(now));
-                }
-                if let Some(voice) = &mut self.voice {
-                    voice.handle_status(status);
-                }
-                self.status = Some((now, status));
-                self.told_attitude = Some(now);
-                if let (Some(_), Some(capabilities)) = (status.heading, self.capabilities) {
-                    let situation = self.situation(now, &capabilities, around);
-                    self.tracking.handle_turned(now, &situation);
-                }
-            }
-            Report::Malformed { reason } => {
-                if let Some(device) = self.device {
-                    self.count_refusal(device, reason);
-                }
-            }
-            Report::Lost => {
-                self.state = DeviceState::Lost;
-                self.status = None;
-                // It may hear us while we do not hear it; and it is stopped when it is heard again.
-                self.unstopped = self.tracking.unstopped();
-                if let Some(turning) = self.unstopped {
-                    self.outputs.push_back(ManagerOutput::Steer(Setpoint::Turn(turning.stopped())));
-                }
-                self.tracking.forget();
-                self.tell(Event::Lost { device: self.device });
-            }
-        }
-        self.carry_out(now, around);
-    }
-
-    /// From now on speaks for the gimbal, or leaves that to the gimbal itself.
-    fn speak_for_device(&mut self, now: Timestamp, speaks: bool) {
-        if self.voice.is_some() == speaks {
-            return;
-        }
-        self.voice = self.number.filter(|_| speaks).map(|number| {
-            let mut voice = DeviceVoice::new(number);
-            for channel in self.status_schedule.channels() {
-                voice.schedule.open(now, channel);
-            }
-            voice
-        });
-    }
-
     /// More, or less, may be known of the vehicle.
     pub fn handle_vehicle(&mut self, now: Timestamp, around: Surroundings<'_>) {
         self.carry_out(now, around);
@@ -397,53 +308,6 @@ impl GimbalManager {
         &self.settings
     }
 
-    pub fn device(&self) -> Option<MavId> {
-        self.device
-    }
-
-    /// The gimbal device id of 280 and 281: a v2 device's component id, any other gimbal's number.
-    pub fn device_id(&self) -> Option<u8> {
-        self.device.map(|device| self.number().unwrap_or(device.component))
-    }
-
-    /// Keeps a device id for the gimbal in case that it turns out to be no v2 device.
-    pub fn keep_number(&mut self, number: u8) {
-        self.number = Some(number);
-    }
-
-    /// The device id that is kept, whether it is used or not.
-    pub fn kept_number(&self) -> Option<u8> {
-        self.number
-    }
-
-    /// 1 to 6 where the gimbal is no v2 device.
-    pub fn number(&self) -> Option<u8> {
-        self.voice.as_ref().map(DeviceVoice::number)
-    }
-
-    pub fn state(&self) -> DeviceState {
-        self.state
-    }
-
-    pub fn identity(&self) -> &Identity {
-        &self.identity
-    }
-
-    /// Whether enough is known of the device to steer it.
-    pub fn is_known(&self) -> bool {
-        self.capabilities.is_some()
-    }
-
-    /// The latest attitude and when it came, however old.
-    pub fn status(&self) -> Option<(Timestamp, &GimbalStatus)> {
-        self.status.as_ref().map(|(at, status)| (*at, status))
-    }
-
-    /// When the device last told an attitude, also if it is lost.
-    pub fn told_attitude_at(&self) -> Option<Timestamp> {
-        self.told_attitude
-    }
-
     pub fn control(&self) -> &Control {
         &self.control
     }
@@ -465,43 +329,6 @@ impl GimbalManager {
     /// Whether somebody holds primary or secondary control.
     pub fn is_held(&self) -> bool {
         self.control.primary().is_some() || self.control.secondary().is_some()
-    }
-
-    /// Whether the device reports a fault that is more than a limit reached.
-    pub fn has_hard_failure(&self) -> bool {
-        self.status.is_some_and(|(_, status)| status.failures.intersects(FailureFlags::HARD))
-    }
-
-    /// 281 for a device on `channel` that misses its manager (`GIMBAL_DEVICE_ERROR_FLAGS_NO_MANAGER`), where somebody has
-    /// switched it off or made it rare; due once a second.
-    pub fn reminder(&self, now: Timestamp, channel: ChannelId) -> Option<Box<MavMessage>> {
-        const OFTEN_ENOUGH: Duration = Duration::from_secs(1);
-        let is_missed = self.status.is_some_and(|(_, status)| status.failures.contains(FailureFlags::NO_MANAGER));
-        let is_told = matches!(self.status_schedule.interval(channel), Interval::Every(every) if every <= OFTEN_ENOUGH);
-        if is_missed && !is_told { self.status_message(now) } else { None }
-    }
-
-    /// The flags for 281: those of the setpoint, with the device's own state bits; the device's while there is none.
-    pub fn flags(&self) -> GimbalFlags {
-        let of_device = GimbalFlags::ACCEPTS_YAW_IN_EARTH_FRAME | GimbalFlags::RC_EXCLUSIVE | GimbalFlags::RC_MIXED;
-        let reported = self.status.map_or(GimbalFlags::empty(), |(_, status)| status.flags);
-        match self.tracking.last() {
-            Some(setpoint) => setpoint.flags().difference(of_device) | reported.intersection(of_device),
-            None => reported.intersection(GimbalFlags::from_bits_retain(0x3ff)),
-        }
-    }
-
-    /// Whether there is a gimbal that can be steered now.
-    fn steerable(&self) -> Result<&Capabilities, Refusal> {
-        match (self.state, &self.capabilities) {
-            (DeviceState::Lost, _) => Err(Refusal { result: CommandResult::Failed, reason: "gimbal_lost" }),
-            (DeviceState::Alive, Some(capabilities)) => {
-                let calibrating =
-                    self.status.is_some_and(|(_, status)| status.failures.contains(FailureFlags::CALIBRATION_RUNNING));
-                if calibrating { Err(Refusal::later("gimbal_calibrating")) } else { Ok(capabilities) }
-            }
-            _ => Err(Refusal::later("no_gimbal_yet")),
-        }
     }
 
     fn handle_demand(
@@ -579,56 +406,8 @@ impl GimbalManager {
         }
     }
 
-    /// A 281 to everybody, besides the regular ones.
-    fn broadcast_status(&mut self, now: Timestamp) {
-        self.told_flags = self.flags();
-        if let Some(message) = self.status_message(now) {
-            self.outputs.push_back(ManagerOutput::Broadcast { channels: None, message });
-        }
-    }
-
     /// When a rotation ends because who asked for it was not heard for the lease, however long its rate may last.
     fn source_lost_at(&self) -> Option<Timestamp> {
         self.tracking.is_rotating().then(|| self.source_heard + self.rules.lease_timeout)
     }
-
-    /// 280 to everybody, once the gimbal is known. What we say for the gimbal comes before it: MAVSDK 3 knows a name only
-    /// if it has 283 before 280.
-    fn announce(&mut self, now: Timestamp, around: Surroundings<'_>) {
-        self.told_can_aim = can_aim(now, around);
-        for message in [self.device_information(now), self.information(now, around)].into_iter().flatten() {
-            self.outputs.push_back(ManagerOutput::Broadcast { channels: None, message });
-        }
-    }
-
-    /// 280, once the gimbal is known.
-    fn information(&self, now: Timestamp, around: Surroundings<'_>) -> Option<Box<MavMessage>> {
-        let (device_id, capabilities) = (self.device_id()?, self.capabilities.as_ref()?);
-        Some(Box::new(messages::information(now, device_id, capabilities, can_aim(now, around))))
-    }
-
-    /// 283 in the name of a gimbal that is no v2 device, once it is known.
-    fn device_information(&self, now: Timestamp) -> Option<Box<MavMessage>> {
-        let (voice, capabilities) = (self.voice.as_ref()?, self.capabilities.as_ref()?);
-        self.device.map(|_| Box::new(voice.information(now, &self.identity, capabilities)))
-    }
-
-    /// 285 in the name of a gimbal that is no v2 device, once it has told where it looks.
-    fn device_attitude_status(&self, now: Timestamp, around: Surroundings<'_>) -> Option<Box<MavMessage>> {
-        let (is_alive, is_locked) = (self.state == DeviceState::Alive, self.tracking.is_locked());
-        let heading = around.vehicle.heading(now);
-        self.voice.as_ref()?.attitude_status(now, is_alive, is_locked, heading).map(Box::new)
-    }
-
-    /// 281, once there is a gimbal.
-    fn status_message(&self, now: Timestamp) -> Option<Box<MavMessage>> {
-        let (primary, secondary) = (self.control.primary(), self.control.secondary());
-        Some(Box::new(messages::status(now, self.device_id()?, self.flags(), primary, secondary)))
-    }
-}
-
-/// Whether a region of interest can be accepted: the vehicle tells where it is. That its heading is missing for a moment,
-/// where the gimbal needs one, makes no other gimbal of it.
-fn can_aim(now: Timestamp, around: Surroundings<'_>) -> bool {
-    around.vehicle.position(now).is_some()
 }

@@ -1,0 +1,172 @@
+//! The gimbal as its driver tells of it, and what follows from that.
+
+use super::events::Event;
+use super::heading::HeadingBias;
+use super::request::Refusal;
+use super::voice::DeviceVoice;
+use super::{DeviceState, GimbalManager, ManagerOutput, Surroundings};
+use crate::gimbals::capabilities::Capabilities;
+use crate::gimbals::report::{GimbalStatus, Identity, Report};
+use crate::gimbals::setpoint::Setpoint;
+use crate::timestamp::Timestamp;
+use crate::wire::MavId;
+use crate::wire::ids::{CommandResult, FailureFlags};
+
+impl GimbalManager {
+    /// News from the driver.
+    pub fn handle_report(&mut self, now: Timestamp, report: Report, around: Surroundings<'_>) {
+        if !matches!(report, Report::Attitude(_) | Report::Malformed { .. }) {
+            self.last_command = None;
+        }
+        match report {
+            Report::Restarted => {
+                // Its clock may have jumped while it goes on turning.
+                let unstopped = self.tracking.unstopped();
+                self.tracking.forget();
+                if let Some(turning) = unstopped {
+                    self.tracking.halt(now, turning);
+                }
+                self.heading_bias = HeadingBias::default();
+                self.tell(Event::Restarted { device: self.device });
+            }
+            Report::Alive { device } => {
+                if self.device != Some(device) {
+                    self.tracking.forget();
+                    self.heading_bias = HeadingBias::default();
+                    self.identity = Identity::default();
+                    self.capabilities = None;
+                    self.status = None;
+                    self.told_attitude = None;
+                    self.unstopped = None;
+                }
+                if let Some(turning) = self.unstopped.take() {
+                    self.tracking.halt(now, turning);
+                }
+                let known = self.device.replace(device) == Some(device);
+                self.state = DeviceState::Alive;
+                self.tell(if known { Event::Back { device } } else { Event::Found { device } });
+            }
+            Report::SpeaksForItself(itself) => self.speak_for_device(now, !itself),
+            Report::Known(identity, capabilities) => {
+                let changed = self.identity != identity || self.capabilities != Some(capabilities);
+                self.identity = identity;
+                self.capabilities = Some(capabilities);
+                if changed {
+                    let (vendor, model) = (&self.identity.vendor, &self.identity.model);
+                    tracing::info!(gimbal = self.settings.name, vendor, model, "gimbal known");
+                    self.announce(now, around);
+                }
+            }
+            Report::Attitude(status) => {
+                if let Some(of_gimbal) = status.heading {
+                    self.heading_bias.handle_heading(now, of_gimbal, around.vehicle.heading(now));
+                }
+                if let Some(voice) = &mut self.voice {
+                    voice.handle_status(status);
+                }
+                self.status = Some((now, status));
+                self.told_attitude = Some(now);
+                if let (Some(_), Some(capabilities)) = (status.heading, self.capabilities) {
+                    let situation = self.situation(now, &capabilities, around);
+                    self.tracking.handle_turned(now, &situation);
+                }
+            }
+            Report::Malformed { reason } => {
+                if let Some(device) = self.device {
+                    self.count_refusal(device, reason);
+                }
+            }
+            Report::Lost => {
+                self.state = DeviceState::Lost;
+                self.status = None;
+                // It may hear us while we do not hear it; and it is stopped when it is heard again.
+                self.unstopped = self.tracking.unstopped();
+                if let Some(turning) = self.unstopped {
+                    self.outputs.push_back(ManagerOutput::Steer(Setpoint::Turn(turning.stopped())));
+                }
+                self.tracking.forget();
+                self.tell(Event::Lost { device: self.device });
+            }
+        }
+        self.carry_out(now, around);
+    }
+
+    /// From now on speaks for the gimbal, or leaves that to the gimbal itself.
+    pub(super) fn speak_for_device(&mut self, now: Timestamp, speaks: bool) {
+        if self.voice.is_some() == speaks {
+            return;
+        }
+        self.voice = self.number.filter(|_| speaks).map(|number| {
+            let mut voice = DeviceVoice::new(number);
+            for channel in self.status_schedule.channels() {
+                voice.schedule.open(now, channel);
+            }
+            voice
+        });
+    }
+
+    /// Keeps a device id for the gimbal in case that it turns out to be no v2 device.
+    pub fn keep_number(&mut self, number: u8) {
+        self.number = Some(number);
+    }
+
+    /// The device id that is kept, whether it is used or not.
+    pub fn kept_number(&self) -> Option<u8> {
+        self.number
+    }
+
+    /// 1 to 6 where the gimbal is no v2 device.
+    pub fn number(&self) -> Option<u8> {
+        self.voice.as_ref().map(DeviceVoice::number)
+    }
+
+    /// The gimbal device id of 280 and 281: a v2 device's component id, any other gimbal's number.
+    pub fn device_id(&self) -> Option<u8> {
+        self.device.map(|device| self.number().unwrap_or(device.component))
+    }
+
+    pub fn device(&self) -> Option<MavId> {
+        self.device
+    }
+
+    pub fn state(&self) -> DeviceState {
+        self.state
+    }
+
+    pub fn identity(&self) -> &Identity {
+        &self.identity
+    }
+
+    /// Whether enough is known of the device to steer it.
+    pub fn is_known(&self) -> bool {
+        self.capabilities.is_some()
+    }
+
+    /// The latest attitude and when it came, however old.
+    pub fn status(&self) -> Option<(Timestamp, &GimbalStatus)> {
+        self.status.as_ref().map(|(at, status)| (*at, status))
+    }
+
+    /// When the device last told an attitude, also if it is lost.
+    pub fn told_attitude_at(&self) -> Option<Timestamp> {
+        self.told_attitude
+    }
+
+    /// Whether the device reports a fault that is more than a limit reached.
+    pub fn has_hard_failure(&self) -> bool {
+        self.status.is_some_and(|(_, status)| status.failures.intersects(FailureFlags::HARD))
+    }
+
+    /// Whether there is a gimbal that can be steered now.
+    pub(super) fn steerable(&self) -> Result<&Capabilities, Refusal> {
+        match (self.state, &self.capabilities) {
+            (DeviceState::Lost, _) => Err(Refusal { result: CommandResult::Failed, reason: "gimbal_lost" }),
+            (DeviceState::Alive, Some(capabilities)) => {
+                let calibrating =
+                    self.status.is_some_and(|(_, status)| status.failures.contains(FailureFlags::CALIBRATION_RUNNING));
+                if calibrating { Err(Refusal::later("gimbal_calibrating")) } else { Ok(capabilities) }
+            }
+            _ => Err(Refusal::later("no_gimbal_yet")),
+        }
+    }
+}
