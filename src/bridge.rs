@@ -6,6 +6,7 @@
 mod allowance;
 mod announcements;
 mod autopilot;
+mod carrying_out;
 mod channels;
 mod conflicts;
 mod delivery;
@@ -16,9 +17,11 @@ mod heartbeat;
 mod identity;
 mod outbox;
 mod own_commands;
+mod own_system;
 pub mod pacing;
 mod picture;
 mod rates;
+mod receiving;
 mod rivals;
 mod roster;
 mod sent;
@@ -30,30 +33,27 @@ mod streams;
 mod transactions;
 
 pub use crate::channel::{ChannelId, ChannelSet};
-use crate::gimbals::DriverOutput;
 use crate::gimbals::operation::{OperationId, OperationResult};
-use crate::gimbals::report::Report;
 use crate::manager::rank::Ranks;
-use crate::manager::{ManagerOutput, Surroundings};
+use crate::manager::Surroundings;
 use crate::router::Router;
 use crate::timers::TimerTable;
 use crate::timestamp::Timestamp;
 use crate::vehicle::Vehicle;
-use crate::wire::dialect::MavMessage;
-use crate::wire::{DatagramFrames, FrameBuffer, MavId, StreamDecoder};
+use crate::wire::{FrameBuffer, MavId};
 use announcements::Announcements;
 use channels::Channels;
 use conflicts::Conflicts;
 use events::Events;
-use identity::{Identity, Ties};
+use identity::Identity;
 use outbox::Outbox;
 use rivals::RivalWatch;
-use roster::{GimbalOutput, Roster};
+use roster::Roster;
 use settings::{Role, Settings};
 use state_for_gimbals::StateForGimbals;
 use stations::Stations;
 use streams::AutopilotStreams;
-use transactions::{Asker, Order, Transactions};
+use transactions::Transactions;
 
 /// Position of a link in [`settings::Settings::links`].
 pub type LinkIndex = usize;
@@ -295,104 +295,6 @@ impl Bridge {
         self.roster.close_channel(channel);
     }
 
-    fn handle_received(&mut self, now: Timestamp, channel: ChannelId, bytes: &[u8]) {
-        let Some(state) = self.channels.channel_mut(channel) else { return };
-        state.last_heard = Some(now);
-        let (link, is_stream) = (state.link, state.decoder.is_some());
-        if let Some(link) = self.channels.link_mut(link) {
-            link.rx_bytes += bytes.len() as u64;
-        }
-        if is_stream {
-            self.decode_stream(now, channel, |decoder| decoder.push(now, bytes));
-            return;
-        }
-        let mut frames = DatagramFrames::new(bytes);
-        while let Some(frame) = frames.next_frame() {
-            self.handle_frame(now, channel, &frame);
-        }
-        if let Some(link) = self.channels.link_mut(link) {
-            link.rx_frames += frames.counters().frames;
-            link.wire.add(frames.counters());
-        }
-    }
-
-    fn decode_stream(&mut self, now: Timestamp, channel: ChannelId, feed: impl FnOnce(&mut StreamDecoder)) {
-        // The decoder is taken out while its frames are dealt with, and put back behind them.
-        let Some(state) = self.channels.channel_mut(channel) else { return };
-        let link = state.link;
-        let Some(mut decoder) = state.decoder.take() else { return };
-        feed(&mut decoder);
-        let mut frames = 0;
-        while let Some(frame) = decoder.next_frame() {
-            frames += 1;
-            self.handle_frame(now, channel, &frame);
-        }
-        if let Some(state) = self.channels.channel_mut(channel) {
-            state.decoder = Some(decoder);
-        }
-        if let Some(link) = self.channels.link_mut(link) {
-            link.rx_frames += frames;
-        }
-    }
-
-    /// Takes the system id that the heartbeats of autopilots amount to.
-    fn settle_identity(&mut self, now: Timestamp) {
-        let before = self.identity.system();
-        let ties = Ties {
-            is_held: self.roster.iter().any(|gimbal| gimbal.manager.is_held()),
-            fallback_is_taken: self.is_fallback_taken(now),
-        };
-        let was_bootstrap = self.identity.is_bootstrap();
-        let is_changed = self.identity.update(now, ties);
-        let system = self.identity.system();
-        if !is_changed {
-            // The fallback id turned out to be right.
-            if let Some(system) = system.filter(|_| was_bootstrap && !self.identity.is_bootstrap()) {
-                self.outbox.push_system_id(system);
-            }
-            return;
-        }
-        tracing::info!(system_id = system, fallback = self.identity.is_bootstrap(), "system id");
-        self.router.set_own_system(system);
-        self.channels.forget_held();
-        self.ranks.set_own_system(system);
-        if let Some(before) = before {
-            self.router.forget_system(before);
-            let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
-            for gimbal in self.roster.iter_mut() {
-                gimbal.manager.forget_system(now, before, around);
-            }
-        }
-        self.autopilot = None;
-        self.autopilot_heard = None;
-        self.vehicle = Vehicle::new();
-        self.transactions.clear();
-        self.state_for_gimbals.stop();
-        if let Some(system) = system
-            && let Some(known) = self.vehicles[usize::from(system)]
-            && (!known.is_on_ground_only || self.is_believed(Role::Ground, system))
-        {
-            self.take_autopilot(now, MavId::new(system, known.component));
-        }
-        if let Some(system) = system
-            && !self.identity.is_bootstrap()
-        {
-            self.outbox.push_system_id(system);
-        }
-        // Our first frame under a new id is a heartbeat, everywhere, and before the frame that settled it goes on: a
-        // gimbal takes the system id of the first heartbeat it hears.
-        self.handle_heartbeat_timer(now);
-    }
-
-    fn take_autopilot(&mut self, now: Timestamp, autopilot: MavId) {
-        tracing::info!(%autopilot, "autopilot found");
-        if self.autopilot != Some(autopilot) {
-            self.state_for_gimbals.stop();
-        }
-        self.autopilot = Some(autopilot);
-        self.streams.handle_autopilot_found(now);
-    }
-
     /// The managers are shown what is known of the vehicle, also when nothing new was heard of it.
     fn handle_vehicle(&mut self, now: Timestamp) {
         let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
@@ -420,96 +322,6 @@ impl Bridge {
             }
         }
         self.shutting_down = true;
-    }
-
-    /// Does what the gimbals' drivers and managers want done, and what is to be done about our own commands.
-    fn carry_out(&mut self, now: Timestamp) {
-        if self.identity.system().is_none() {
-            return;
-        }
-        self.carry_out_for_gimbals(now);
-        self.carry_out_own_commands(now);
-    }
-
-    fn carry_out_for_gimbals(&mut self, now: Timestamp) {
-        for at in 0..self.roster.len() {
-            while let Some(output) = self.roster.get_mut(at).poll_output() {
-                let component = self.roster.get_mut(at).component;
-                match output {
-                    GimbalOutput::Driver(DriverOutput::Message(message)) => {
-                        let device = self.roster.get_mut(at).manager.device();
-                        let channels = device.map_or(ChannelSet::EMPTY, |device| self.channels_of_device(device));
-                        self.send(now, channels, component, &message);
-                    }
-                    GimbalOutput::Driver(DriverOutput::Command(command)) => {
-                        let order = Order { asker: Asker::Driver, manager: component, command: *command };
-                        self.transactions.send(now, order);
-                    }
-                    GimbalOutput::Driver(DriverOutput::Report(report)) => {
-                        if report == Report::SpeaksForItself(false) {
-                            self.roster.keep_number(at);
-                        }
-                        let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
-                        self.roster.get_mut(at).manager.handle_report(now, report, around);
-                    }
-                    GimbalOutput::Driver(DriverOutput::Operated { id, result }) => {
-                        self.outbox.push_operated(id, result)
-                    }
-                    GimbalOutput::Manager(output) => self.carry_out_for_manager(now, at, component, output),
-                }
-            }
-        }
-    }
-
-    fn carry_out_for_manager(&mut self, now: Timestamp, at: usize, component: u8, output: ManagerOutput) {
-        match output {
-            ManagerOutput::Reply { to, channel, message } => {
-                // Who cannot be learned, such as a component 0, is where it spoke.
-                let known = self.router.route_known(now, to);
-                let channels = if known.is_empty() { channel.into() } else { known };
-                self.answer(now, channels, component, &message);
-            }
-            ManagerOutput::Answer { channel, message } => self.answer(now, channel.into(), component, &message),
-            ManagerOutput::Broadcast { channels, message } => {
-                let mut channels = channels.unwrap_or(self.channels.open_set());
-                if !matches!(*message, MavMessage::GIMBAL_MANAGER_STATUS(_)) {
-                    // A gimbal has no use for what a manager tells its clients.
-                    channels = channels.without(self.channels.with_role(Role::Gimbal));
-                }
-                self.send(now, channels, component, &message);
-            }
-            ManagerOutput::Heartbeat { channels } => {
-                let message = heartbeat::heartbeat(self.roster.get_mut(at), self.identity.is_bootstrap());
-                self.answer(now, channels.unwrap_or(self.channels.open_set()), component, &message);
-            }
-            ManagerOutput::Steer(setpoint) => self.roster.get_mut(at).driver.handle_setpoint(now, setpoint),
-            ManagerOutput::Event(event) => self.handle_event(now, at, event),
-        }
-    }
-
-    fn channels_of_device(&self, device: MavId) -> ChannelSet {
-        self.roster.channel_of(device).map_or(ChannelSet::EMPTY, ChannelSet::from)
-    }
-
-    /// Sends a message of our own, numbered for each channel.
-    fn send(&mut self, now: Timestamp, channels: ChannelSet, component: u8, message: &MavMessage) {
-        if let Some(system) = self.identity.system() {
-            self.send_as(now, system, channels, component, message);
-        }
-    }
-
-    /// Sends what was asked for, numbered for each channel.
-    fn answer(&mut self, now: Timestamp, channels: ChannelSet, component: u8, message: &MavMessage) {
-        if let Some(system) = self.identity.system() {
-            let frame = self.buffer.encode_any(MavId::new(system, component), 0, message);
-            self.channels.transmit_answer(now, channels, &frame, &mut self.outbox);
-        }
-    }
-
-    fn send_as(&mut self, now: Timestamp, system: u8, channels: ChannelSet, component: u8, message: &MavMessage) {
-        // The number is given where the frame leaves.
-        let frame = self.buffer.encode_any(MavId::new(system, component), 0, message);
-        self.channels.transmit_own(now, channels, &frame, &mut self.outbox);
     }
 
     fn is_own_id(&self, id: MavId) -> bool {

@@ -1,0 +1,112 @@
+//! Does what drivers and managers want done: frames of our own, orders to a gimbal, answers.
+
+use super::roster::GimbalOutput;
+use super::settings::Role;
+use super::transactions::{Asker, Order};
+use super::{Bridge, heartbeat, surroundings};
+use crate::channel::ChannelSet;
+use crate::gimbals::DriverOutput;
+use crate::gimbals::report::Report;
+use crate::manager::ManagerOutput;
+use crate::timestamp::Timestamp;
+use crate::wire::MavId;
+use crate::wire::dialect::MavMessage;
+
+impl Bridge {
+    /// Does what the gimbals' drivers and managers want done, and what is to be done about our own commands.
+    pub(super) fn carry_out(&mut self, now: Timestamp) {
+        if self.identity.system().is_none() {
+            return;
+        }
+        self.carry_out_for_gimbals(now);
+        self.carry_out_own_commands(now);
+    }
+
+    pub(super) fn carry_out_for_gimbals(&mut self, now: Timestamp) {
+        for at in 0..self.roster.len() {
+            while let Some(output) = self.roster.get_mut(at).poll_output() {
+                let component = self.roster.get_mut(at).component;
+                match output {
+                    GimbalOutput::Driver(DriverOutput::Message(message)) => {
+                        let device = self.roster.get_mut(at).manager.device();
+                        let channels = device.map_or(ChannelSet::EMPTY, |device| self.channels_of_device(device));
+                        self.send(now, channels, component, &message);
+                    }
+                    GimbalOutput::Driver(DriverOutput::Command(command)) => {
+                        let order = Order { asker: Asker::Driver, manager: component, command: *command };
+                        self.transactions.send(now, order);
+                    }
+                    GimbalOutput::Driver(DriverOutput::Report(report)) => {
+                        if report == Report::SpeaksForItself(false) {
+                            self.roster.keep_number(at);
+                        }
+                        let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
+                        self.roster.get_mut(at).manager.handle_report(now, report, around);
+                    }
+                    GimbalOutput::Driver(DriverOutput::Operated { id, result }) => {
+                        self.outbox.push_operated(id, result)
+                    }
+                    GimbalOutput::Manager(output) => self.carry_out_for_manager(now, at, component, output),
+                }
+            }
+        }
+    }
+
+    pub(super) fn carry_out_for_manager(&mut self, now: Timestamp, at: usize, component: u8, output: ManagerOutput) {
+        match output {
+            ManagerOutput::Reply { to, channel, message } => {
+                // Who cannot be learned, such as a component 0, is where it spoke.
+                let known = self.router.route_known(now, to);
+                let channels = if known.is_empty() { channel.into() } else { known };
+                self.answer(now, channels, component, &message);
+            }
+            ManagerOutput::Answer { channel, message } => self.answer(now, channel.into(), component, &message),
+            ManagerOutput::Broadcast { channels, message } => {
+                let mut channels = channels.unwrap_or(self.channels.open_set());
+                if !matches!(*message, MavMessage::GIMBAL_MANAGER_STATUS(_)) {
+                    // A gimbal has no use for what a manager tells its clients.
+                    channels = channels.without(self.channels.with_role(Role::Gimbal));
+                }
+                self.send(now, channels, component, &message);
+            }
+            ManagerOutput::Heartbeat { channels } => {
+                let message = heartbeat::heartbeat(self.roster.get_mut(at), self.identity.is_bootstrap());
+                self.answer(now, channels.unwrap_or(self.channels.open_set()), component, &message);
+            }
+            ManagerOutput::Steer(setpoint) => self.roster.get_mut(at).driver.handle_setpoint(now, setpoint),
+            ManagerOutput::Event(event) => self.handle_event(now, at, event),
+        }
+    }
+
+    pub(super) fn channels_of_device(&self, device: MavId) -> ChannelSet {
+        self.roster.channel_of(device).map_or(ChannelSet::EMPTY, ChannelSet::from)
+    }
+
+    /// Sends a message of our own, numbered for each channel.
+    pub(super) fn send(&mut self, now: Timestamp, channels: ChannelSet, component: u8, message: &MavMessage) {
+        if let Some(system) = self.identity.system() {
+            self.send_as(now, system, channels, component, message);
+        }
+    }
+
+    /// Sends what was asked for, numbered for each channel.
+    pub(super) fn answer(&mut self, now: Timestamp, channels: ChannelSet, component: u8, message: &MavMessage) {
+        if let Some(system) = self.identity.system() {
+            let frame = self.buffer.encode_any(MavId::new(system, component), 0, message);
+            self.channels.transmit_answer(now, channels, &frame, &mut self.outbox);
+        }
+    }
+
+    pub(super) fn send_as(
+        &mut self,
+        now: Timestamp,
+        system: u8,
+        channels: ChannelSet,
+        component: u8,
+        message: &MavMessage,
+    ) {
+        // The number is given where the frame leaves.
+        let frame = self.buffer.encode_any(MavId::new(system, component), 0, message);
+        self.channels.transmit_own(now, channels, &frame, &mut self.outbox);
+    }
+}
