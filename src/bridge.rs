@@ -34,8 +34,8 @@ mod transactions;
 
 pub use crate::channel::{ChannelId, ChannelSet};
 use crate::gimbals::operation::{OperationId, OperationResult};
-use crate::manager::rank::Ranks;
 use crate::manager::Surroundings;
+use crate::manager::rank::Ranks;
 use crate::router::Router;
 use crate::timers::TimerTable;
 use crate::timestamp::Timestamp;

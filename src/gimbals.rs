@@ -3,7 +3,9 @@
 pub mod adapt;
 pub mod capabilities;
 pub mod details;
+pub mod detection;
 pub mod driver;
+pub mod families;
 pub mod mavlink_v1;
 pub mod mavlink_v2;
 pub mod operation;

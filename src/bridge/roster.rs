@@ -12,8 +12,7 @@ pub use adoption::{Hearing, NotAdopted, Place, Renamed};
 use super::LinkIndex;
 use super::settings::Settings;
 use crate::channel::{ChannelId, ChannelSet};
-use crate::gimbals::mavlink_v1::MavlinkV1Driver;
-use crate::gimbals::mavlink_v2::MavlinkV2Driver;
+use crate::gimbals::families;
 use crate::gimbals::settings::{Family, GimbalSettings};
 use crate::gimbals::{DriverOutput, GimbalDriver};
 use crate::manager::settings::ControlSettings;
@@ -56,10 +55,7 @@ impl Gimbal {
         configured: bool,
         number: Option<u8>,
     ) -> Self {
-        let driver: Box<dyn GimbalDriver> = match settings.family {
-            Family::Auto | Family::MavlinkV2 => Box::new(MavlinkV2Driver::new()),
-            Family::MavlinkV1 => Box::new(MavlinkV1Driver::new(settings.v1_sign)),
-        };
+        let driver = families::driver(settings.family, &settings);
         Self {
             manager: GimbalManager::new(settings, rules.clone(), number),
             driver,
@@ -86,10 +82,7 @@ impl Gimbal {
 
     /// What it speaks, as far as that is known.
     pub fn family(&self) -> Family {
-        match self.manager.settings().family {
-            Family::Auto => Family::MavlinkV2,
-            family => family,
-        }
+        self.driver.family()
     }
 
     /// `MAV_TYPE` of its manager: "the MAV_TYPE is correctly set to MAV_TYPE_GIMBAL" on the ids of gimbals, where it

@@ -4,6 +4,7 @@ use super::details::GimbalDetails;
 use super::operation::{Operation, OperationId, OperationResult};
 use super::report::Report;
 use super::setpoint::Setpoint;
+use super::settings::Family;
 use crate::timestamp::Timestamp;
 use crate::wire::dialect::{COMMAND_LONG_DATA, MavMessage};
 use crate::wire::{Frame, MavId};
@@ -12,6 +13,9 @@ use crate::wire::{Frame, MavId};
 ///
 /// One call of a `handle_*`, then [`poll_output`](Self::poll_output) until it is `None`.
 pub trait GimbalDriver: std::fmt::Debug {
+    /// What the gimbal speaks, as far as that is known.
+    fn family(&self) -> Family;
+
     /// The component this driver is to talk to.
     fn adopt(&mut self, now: Timestamp, device: MavId);
 

@@ -2,6 +2,7 @@
 
 mod autopilot_state;
 mod codec;
+mod detection;
 mod discovery;
 mod gimbals;
 mod identity;

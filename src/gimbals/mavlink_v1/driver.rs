@@ -14,6 +14,7 @@ use crate::gimbals::driver::{CommandOutcome, DriverOutput, GimbalDriver};
 use crate::gimbals::operation::{Operation, OperationError, OperationId};
 use crate::gimbals::report::{GimbalAttitude, GimbalStatus, Identity, Report};
 use crate::gimbals::setpoint::Setpoint;
+use crate::gimbals::settings::Family;
 use crate::timers::TimerTable;
 use crate::timestamp::Timestamp;
 use crate::wire::dialect::{COMMAND_LONG_DATA, HEARTBEAT_DATA, MOUNT_STATUS_DATA, MessageData};
@@ -236,6 +237,10 @@ impl MavlinkV1Driver {
 }
 
 impl GimbalDriver for MavlinkV1Driver {
+    fn family(&self) -> Family {
+        Family::MavlinkV1
+    }
+
     fn adopt(&mut self, _now: Timestamp, device: MavId) {
         let outputs = std::mem::take(&mut self.outputs);
         *self = Self { device: Some(device), outputs, ..Self::new(self.signs) };

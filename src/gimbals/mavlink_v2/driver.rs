@@ -13,6 +13,7 @@ use crate::gimbals::driver::{CommandOutcome, DriverOutput, GimbalDriver};
 use crate::gimbals::operation::{Operation, OperationError, OperationId};
 use crate::gimbals::report::{GimbalStatus, Identity, Report};
 use crate::gimbals::setpoint::Setpoint;
+use crate::gimbals::settings::Family;
 use crate::timers::TimerTable;
 use crate::timestamp::Timestamp;
 use crate::wire::dialect::{COMMAND_LONG_DATA, MavMessage};
@@ -235,6 +236,10 @@ impl MavlinkV2Driver {
 }
 
 impl GimbalDriver for MavlinkV2Driver {
+    fn family(&self) -> Family {
+        Family::MavlinkV2
+    }
+
     fn adopt(&mut self, _now: Timestamp, device: MavId) {
         *self = Self { device: Some(device), outputs: std::mem::take(&mut self.outputs), ..Self::default() };
     }

@@ -1,0 +1,231 @@
+//! Finds out what a gimbal speaks, where the configuration leaves that open (`family = "auto"`).
+//!
+//! Every gimbal is taken for a v2 device at first, and asked who it is for ever, as the Gimbal Protocol v2 has it. One that
+//! gives no sign of being one is taken for a v1 gimbal: soon when it tells where it looks by a message of v1, late when it
+//! sends nothing but heartbeats. Nothing of this moves it. Whenever a sign of v2 comes after all, it is a v2 device again.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use super::details::GimbalDetails;
+use super::driver::{CommandOutcome, DriverOutput, GimbalDriver};
+use super::families;
+use super::mavlink_v2::{MavlinkV2Driver, packet};
+use super::operation::{Operation, OperationId};
+use super::report::Report;
+use super::setpoint::Setpoint;
+use super::settings::{Family, GimbalSettings};
+use crate::timers::TimerTable;
+use crate::timestamp::Timestamp;
+use crate::wire::dialect::COMMAND_LONG_DATA;
+use crate::wire::ids::message;
+use crate::wire::{Frame, MavId};
+
+/// A gimbal that tells its attitude by messages of v1, and says nothing of v2 for so long, is a v1 gimbal.
+pub const V1_BY_ITS_ATTITUDE_AFTER: Duration = Duration::from_secs(5);
+
+/// So is one that sends nothing but heartbeats for so long; a v2 device may take 15 s to start.
+pub const V1_BY_ITS_SILENCE_AFTER: Duration = Duration::from_secs(20);
+
+/// Stands in front of the driver of whatever family it turns out to be.
+#[derive(Debug)]
+pub struct Detection {
+    settings: GimbalSettings,
+    device: Option<MavId>,
+    /// Asks for 283 also while another family is in use, so that a sign of v2 is not missed.
+    v2: MavlinkV2Driver,
+    /// The driver in use, where it is not `v2`.
+    other: Option<Box<dyn GimbalDriver>>,
+    evidence: Evidence,
+    /// That it is there was reported, and that it is lost was not.
+    is_reported: bool,
+    timers: TimerTable<Timer>,
+    outputs: VecDeque<DriverOutput>,
+}
+
+/// What the device said of its family since it was adopted.
+#[derive(Clone, Copy, Debug, Default)]
+struct Evidence {
+    v2: bool,
+    v1_attitude: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Timer {
+    /// When to do without v2, if it tells its attitude by v1.
+    JudgeByAttitude,
+    /// When to do without v2 in any case.
+    JudgeBySilence,
+}
+
+impl Detection {
+    pub fn new(settings: GimbalSettings) -> Self {
+        Self {
+            settings,
+            device: None,
+            v2: MavlinkV2Driver::new(),
+            other: None,
+            evidence: Evidence::default(),
+            is_reported: false,
+            timers: TimerTable::default(),
+            outputs: VecDeque::new(),
+        }
+    }
+
+    fn in_use(&mut self) -> &mut dyn GimbalDriver {
+        match &mut self.other {
+            Some(other) => other.as_mut(),
+            None => &mut self.v2,
+        }
+    }
+
+    /// From now on the gimbal is of `family`.
+    fn take(&mut self, now: Timestamp, family: Family) {
+        let Some(device) = self.device.filter(|_| self.family() != family) else { return };
+        tracing::info!(%device, family = family.name(), "the gimbal's family is known");
+        self.timers.cancel(Timer::JudgeByAttitude);
+        self.timers.cancel(Timer::JudgeBySilence);
+        self.outputs.push_back(DriverOutput::Report(Report::SpeaksForItself(family == Family::MavlinkV2)));
+        if family == Family::MavlinkV2 {
+            // What it told meanwhile went nowhere.
+            self.v2 = MavlinkV2Driver::new();
+            self.v2.adopt(now, device);
+            self.other = None;
+        } else {
+            let mut other = families::driver(family, &self.settings);
+            other.adopt(now, device);
+            self.other = Some(other);
+        }
+    }
+
+    /// Notes what a frame of the device says of its family.
+    fn weigh(&mut self, now: Timestamp, frame: &Frame<'_>) {
+        match frame.message_id() {
+            message::HEARTBEAT if !self.is_reported && self.other.is_none() && !self.evidence.v2 => {
+                self.timers.set(Timer::JudgeByAttitude, now + V1_BY_ITS_ATTITUDE_AFTER);
+                self.timers.set(Timer::JudgeBySilence, now + V1_BY_ITS_SILENCE_AFTER);
+            }
+            message::GIMBAL_DEVICE_INFORMATION | message::GIMBAL_DEVICE_ATTITUDE_STATUS
+                if (!self.evidence.v2 || self.other.is_some()) && is_of_v2(frame) =>
+            {
+                self.evidence.v2 = true;
+                self.timers.cancel(Timer::JudgeByAttitude);
+                self.timers.cancel(Timer::JudgeBySilence);
+                self.take(now, Family::MavlinkV2);
+            }
+            message::MOUNT_ORIENTATION | message::MOUNT_STATUS => self.evidence.v1_attitude = true,
+            _ => {}
+        }
+    }
+
+    /// Takes over what the drivers want done; beside another driver in use, v2 only asks.
+    fn collect(&mut self) {
+        while let Some(output) = self.in_use().poll_output() {
+            match output {
+                // A driver that took the place of another hears the gimbal for the first time, the manager does not.
+                DriverOutput::Report(Report::Alive { .. }) if self.is_reported => {}
+                DriverOutput::Report(Report::Alive { .. }) => {
+                    self.is_reported = true;
+                    self.outputs.push_back(output);
+                }
+                DriverOutput::Report(Report::Lost) => {
+                    self.is_reported = false;
+                    self.timers.cancel(Timer::JudgeByAttitude);
+                    self.timers.cancel(Timer::JudgeBySilence);
+                    self.outputs.push_back(output);
+                }
+                output => self.outputs.push_back(output),
+            }
+        }
+        if self.other.is_some() {
+            while let Some(output) = self.v2.poll_output() {
+                if let DriverOutput::Message(_) = output {
+                    self.outputs.push_back(output);
+                }
+            }
+        }
+    }
+}
+
+impl GimbalDriver for Detection {
+    fn family(&self) -> Family {
+        self.other.as_ref().map_or(Family::MavlinkV2, |other| other.family())
+    }
+
+    fn adopt(&mut self, now: Timestamp, device: MavId) {
+        *self = Self { outputs: std::mem::take(&mut self.outputs), ..Self::new(self.settings.clone()) };
+        self.device = Some(device);
+        self.v2.adopt(now, device);
+        self.collect();
+    }
+
+    fn handle_received(&mut self, now: Timestamp, frame: &Frame<'_>) {
+        if Some(frame.source()) != self.device {
+            return;
+        }
+        self.weigh(now, frame);
+        self.v2.handle_received(now, frame);
+        if let Some(other) = &mut self.other {
+            other.handle_received(now, frame);
+        }
+        self.collect();
+    }
+
+    fn handle_link_lost(&mut self) {
+        self.v2.handle_link_lost();
+        if let Some(other) = &mut self.other {
+            other.handle_link_lost();
+        }
+        self.collect();
+    }
+
+    fn handle_setpoint(&mut self, now: Timestamp, setpoint: Setpoint) {
+        self.in_use().handle_setpoint(now, setpoint);
+        self.collect();
+    }
+
+    fn handle_command_outcome(&mut self, now: Timestamp, command: &COMMAND_LONG_DATA, outcome: CommandOutcome) {
+        self.in_use().handle_command_outcome(now, command, outcome);
+        self.collect();
+    }
+
+    fn handle_operation(&mut self, now: Timestamp, id: OperationId, operation: Operation) {
+        self.in_use().handle_operation(now, id, operation);
+        self.collect();
+    }
+
+    fn handle_timeout(&mut self, now: Timestamp) {
+        self.v2.handle_timeout(now);
+        if let Some(other) = &mut self.other {
+            other.handle_timeout(now);
+        }
+        while let Some(timer) = self.timers.pop_due(now) {
+            match timer {
+                Timer::JudgeByAttitude if self.evidence.v1_attitude => self.take(now, Family::MavlinkV1),
+                Timer::JudgeByAttitude => {}
+                Timer::JudgeBySilence => self.take(now, Family::MavlinkV1),
+            }
+        }
+        self.collect();
+    }
+
+    fn poll_output(&mut self) -> Option<DriverOutput> {
+        self.outputs.pop_front()
+    }
+
+    fn poll_timeout(&self) -> Option<Timestamp> {
+        let other = self.other.as_ref().and_then(|other| other.poll_timeout());
+        let timer = self.timers.next().map(|(at, _)| at);
+        [self.v2.poll_timeout(), other, timer].into_iter().flatten().min()
+    }
+
+    fn details(&self, now: Timestamp) -> GimbalDetails {
+        self.other.as_ref().map_or_else(|| self.v2.details(now), |other| other.details(now))
+    }
+}
+
+/// Whether only a v2 device says that of itself.
+fn is_of_v2(frame: &Frame<'_>) -> bool {
+    packet::read_information(frame).is_some_and(|information| information.gimbal_device_id == 0)
+        || packet::read_status(frame).is_some_and(|status| status.gimbal_device_id == 0)
+}

@@ -1,0 +1,139 @@
+//! `family = "auto"`: what a gimbal speaks is found out by listening, and nothing of that moves it.
+
+use std::time::Duration;
+
+use gimbald::geometry::Angle;
+use gimbald::gimbals::detection::{V1_BY_ITS_ATTITUDE_AFTER, V1_BY_ITS_SILENCE_AFTER};
+use gimbald::gimbals::mavlink_v1::sim::{Device, DeviceSettings, Feedback};
+use gimbald::sim::plant::PlantSettings;
+use gimbald::sim::vehicle::{Vehicle, VehicleSettings};
+use gimbald::timestamp::Timestamp;
+use gimbald::wire::MavId;
+use gimbald::wire::dialect::{
+    COMMAND_LONG_DATA, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA,
+    GIMBAL_MANAGER_INFORMATION_DATA, MavMessage,
+};
+
+use crate::support::script::{
+    NAN, command_long, device_information, gimbal_heartbeat, ground_heartbeat, of, pitch_yaw_deg, usual_capabilities,
+};
+use crate::support::world::{Arrival, GCS, GIMBAL, Places, World, three_links};
+
+const MANAGER: MavId = MavId::new(1, 191);
+const SECOND: Duration = Duration::from_secs(1);
+
+/// A flying vehicle and a v1 gimbal of which the configuration says nothing.
+fn with_v1_gimbal(reports: Feedback) -> (World, Places) {
+    let (mut world, places) = World::empty(three_links());
+    world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
+    let plant = PlantSettings { noise: Angle::ZERO, ..DeviceSettings::default().plant };
+    world.install(
+        places.gimbal,
+        Device::new(Timestamp::ZERO, DeviceSettings { feedback: reports, plant, ..DeviceSettings::default() }),
+    );
+    (world, places)
+}
+
+fn run(world: &mut World, places: Places, duration: Duration) {
+    world.run_with(duration, &[(SECOND, places.ground, GCS, ground_heartbeat())]);
+}
+
+fn from_manager(arrivals: Vec<Arrival>) -> Vec<Arrival> {
+    arrivals.into_iter().filter(|arrival| arrival.source() == MANAGER).collect()
+}
+
+fn family(world: &World) -> String {
+    world.snapshot().gimbals[0].family.clone()
+}
+
+/// The mount commands that reached the gimbal.
+fn mount_commands(world: &mut World, places: Places) -> Vec<COMMAND_LONG_DATA> {
+    let commands: Vec<COMMAND_LONG_DATA> = of(&world.take(places.gimbal));
+    commands.into_iter().filter(|command| matches!(command.command, 204 | 205)).collect()
+}
+
+/// "A v1 gimbal behind gimbald looks like a v2 gimbal to every client", also one that no entry describes: it is told from
+/// a v2 device by what it says of its attitude.
+#[test]
+fn a_gimbal_that_tells_its_attitude_by_v1_is_a_v1_gimbal() {
+    let (mut world, places) = with_v1_gimbal(Feedback::Orientation);
+    run(&mut world, places, V1_BY_ITS_ATTITUDE_AFTER);
+    assert_eq!(family(&world), "mavlink_v2", "as every gimbal is at first");
+    assert!(of::<GIMBAL_MANAGER_INFORMATION_DATA>(&world.take(places.ground)).is_empty());
+
+    run(&mut world, places, 5 * SECOND);
+
+    assert_eq!(family(&world), "mavlink_v1");
+    assert_eq!(mount_commands(&mut world, places), [], "nobody has asked for anything");
+    let heard = from_manager(world.take(places.ground));
+    assert_eq!(of::<GIMBAL_DEVICE_INFORMATION_DATA>(&heard).len(), 1);
+    let information: Vec<GIMBAL_MANAGER_INFORMATION_DATA> = of(&heard);
+    assert_eq!(information.iter().map(|message| message.gimbal_device_id).collect::<Vec<_>>(), [1]);
+    let statuses: Vec<GIMBAL_DEVICE_ATTITUDE_STATUS_DATA> = of(&heard);
+    assert!(statuses.len() >= 20, "{} in some seconds", statuses.len());
+    assert!(statuses.iter().all(|status| status.gimbal_device_id == 1));
+
+    world.send(places.ground, GCS, &command_long(MANAGER, 1000, &[-30.0, 20.0, NAN, NAN, 44.0, 0.0, 1.0]));
+    run(&mut world, places, 4 * SECOND);
+    let statuses: Vec<GIMBAL_DEVICE_ATTITUDE_STATUS_DATA> = of(&from_manager(world.take(places.ground)));
+    let (pitch, yaw) = pitch_yaw_deg(statuses.last().expect("285 is streamed").q);
+    assert!((pitch + 30.0).abs() < 0.5 && (yaw - 20.0).abs() < 0.5, "{pitch} {yaw}");
+}
+
+/// A v1 gimbal need not report anything ("Optionally report MOUNT_STATUS and/or MOUNT_ORIENTATION").
+#[test]
+fn a_gimbal_that_only_beats_is_a_v1_gimbal_in_the_end() {
+    let (mut world, places) = with_v1_gimbal(Feedback::Nothing);
+    run(&mut world, places, V1_BY_ITS_SILENCE_AFTER);
+    assert_eq!(family(&world), "mavlink_v2");
+
+    run(&mut world, places, 5 * SECOND);
+
+    assert_eq!(family(&world), "mavlink_v1");
+    let information: Vec<GIMBAL_DEVICE_INFORMATION_DATA> = of(&from_manager(world.take(places.ground)));
+    let names: Vec<&str> = information.iter().map(|message| message.custom_name.to_str().expect("text")).collect();
+    assert_eq!(names, ["", "open loop"]);
+    assert_eq!(mount_commands(&mut world, places), []);
+}
+
+/// Protocol checklist 26: "the request repeats … forever": a v2 device that answers late is one.
+#[test]
+fn a_device_that_answers_after_all_is_a_v2_device() {
+    let (mut world, places) = World::empty(three_links());
+    world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
+    world.run_with(30 * SECOND, &[(SECOND, places.gimbal, GIMBAL, gimbal_heartbeat())]);
+    assert_eq!((family(&world).as_str(), world.snapshot().gimbals[0].device_id), ("mavlink_v1", Some(1)));
+    world.forget();
+
+    let information = MavMessage::GIMBAL_DEVICE_INFORMATION(device_information(world.now, usual_capabilities()));
+    world.send(places.gimbal, GIMBAL, &information);
+
+    let snapshot = world.snapshot().gimbals.remove(0);
+    assert_eq!(
+        (snapshot.family.as_str(), snapshot.device_id, snapshot.state.as_str()),
+        ("mavlink_v2", Some(154), "alive")
+    );
+    let announced: Vec<GIMBAL_MANAGER_INFORMATION_DATA> = of(&from_manager(world.arrivals(places.ground).to_vec()));
+    assert_eq!(announced.iter().map(|message| message.gimbal_device_id).collect::<Vec<_>>(), [154]);
+    world.run_with(10 * SECOND, &[(SECOND, places.gimbal, GIMBAL, gimbal_heartbeat())]);
+    let heard = from_manager(world.take(places.ground));
+    assert!(of::<GIMBAL_DEVICE_ATTITUDE_STATUS_DATA>(&heard).is_empty(), "it speaks for itself");
+    assert_eq!(family(&world), "mavlink_v2", "for good");
+    let found = world.snapshot().events.iter().filter(|event| event.what == "gimbal_found").count();
+    assert_eq!(found, 1, "it was there all the time");
+}
+
+/// A v1 gimbal that was lost and is heard again is taken for one at once.
+#[test]
+fn what_was_found_out_is_kept_when_the_gimbal_comes_back() {
+    let (mut world, places) = with_v1_gimbal(Feedback::Orientation);
+    run(&mut world, places, 10 * SECOND);
+    world.unplug(places.gimbal);
+    run(&mut world, places, 3 * SECOND);
+    assert_eq!(world.snapshot().gimbals[0].state, "lost");
+
+    world.plug_in(places.gimbal);
+    run(&mut world, places, 2 * SECOND);
+
+    assert_eq!((family(&world).as_str(), world.snapshot().gimbals[0].state.as_str()), ("mavlink_v1", "alive"));
+}
