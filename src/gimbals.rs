@@ -6,6 +6,7 @@ pub mod details;
 pub mod detection;
 pub mod driver;
 pub mod families;
+pub mod gremsy;
 pub mod mavlink_v1;
 pub mod mavlink_v2;
 pub mod operation;

@@ -46,6 +46,7 @@ pub mod message {
     pub const PARAM_REQUEST_LIST: u32 = 21;
     pub const PARAM_VALUE: u32 = 22;
     pub const PARAM_SET: u32 = 23;
+    pub const RAW_IMU: u32 = 27;
     pub const ATTITUDE: u32 = 30;
     pub const ATTITUDE_QUATERNION: u32 = 31;
     pub const LOCAL_POSITION_NED: u32 = 32;
@@ -110,6 +111,8 @@ pub mod command {
     pub const DO_GIMBAL_MANAGER_CONFIGURE: u16 = 1001;
     /// `MAV_CMD_DO_GIMBAL_MANAGER_TRACK_RECTANGLE` until 2020; no id of today.
     pub const DO_GIMBAL_MANAGER_TRACK_RECTANGLE: u16 = 1002;
+    pub const USER_1: u16 = 31_010;
+    pub const USER_2: u16 = 31_011;
     pub const REQUEST_OPERATOR_CONTROL: u16 = 32_100;
     pub const GIMBAL_RESET: u16 = 42_501;
 }

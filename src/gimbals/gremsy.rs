@@ -1,0 +1,11 @@
+//! Gimbals by Gremsy, whose firmware speaks MAVLink in two generations: mount commands with the vendor's own modes
+//! (v1), and the Gimbal Protocol v2 with the vendor's own flags (v2).
+//!
+//! Facts are those of the vendor's gSDK (2020 to 2026) and its guide; what no published source settles says so.
+
+pub mod modes;
+pub mod packet;
+pub mod parameters;
+pub mod readings;
+pub mod status;
+pub mod version;

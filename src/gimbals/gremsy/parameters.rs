@@ -1,0 +1,248 @@
+//! The parameters of a Gremsy: what each is for, and what it is called.
+//!
+//! There are two tables of names, one of the firmware up to 2021 and one of the firmware since (7.7.3). Which one a
+//! gimbal has is told by the names that it lists. All values are int16, sent as numbers in the float field
+//! (`PARAM_SET` with `param_type` INT16), and matched by name: indices are sparse and differ.
+
+mod axis_motion;
+mod codes;
+mod limits;
+mod motor_control;
+mod tables;
+
+use std::fmt;
+use std::ops::RangeInclusive;
+
+pub use axis_motion::AxisMotion;
+pub use codes::{AxisFlags, EncoderType, RcType};
+pub use limits::{AngleLimits, TiltSense};
+pub use motor_control::MotorControl;
+pub use tables::{ParameterTable, Row};
+
+use crate::wire::MavId;
+use crate::wire::dialect::{CharArray, PARAM_SET_DATA};
+
+/// `MAV_PARAM_TYPE_INT16`.
+pub const INT16: u8 = 4;
+
+/// The vendor's names for pitch, roll and yaw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axis {
+    Tilt,
+    Roll,
+    Pan,
+}
+
+impl Axis {
+    pub const ALL: [Self; 3] = [Self::Tilt, Self::Roll, Self::Pan];
+
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Tilt => "tilt",
+            Self::Roll => "roll",
+            Self::Pan => "pan",
+        }
+    }
+}
+
+/// What a parameter is for, the same in both tables.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Parameter {
+    VersionX,
+    VersionY,
+    VersionZ,
+    /// How hard the axis corrects movement.
+    Stiffness(Axis),
+    /// Power of the axis' motor.
+    HoldStrength(Axis),
+    /// How fast an axis returns; one for all of them, in the old table only.
+    Gain,
+    OutputFilter,
+    GyroFilter,
+    FollowSpeed(Axis),
+    FollowSmoothing(Axis),
+    /// How far the vehicle turns before the axis follows, degrees.
+    FollowWindow(Axis),
+    /// The fastest that the axis turns when it is steered, degrees per second.
+    ControlSpeed(Axis),
+    ControlSmoothing(Axis),
+    /// The smaller and the larger number of the software limit as the gimbal stores them, degrees ([`AngleLimits`]).
+    LimitMin(Axis),
+    LimitMax(Axis),
+    /// Which axes are reversed, and two switches that found room there ([`AxisFlags`]).
+    AxisFlags,
+    /// Where control comes from ([`RcType`]).
+    RcType,
+    /// What `MOUNT_STATUS` carries ([`EncoderType`]).
+    EncoderType,
+    AdaptiveControl,
+    /// 0 the shortest way to an angle, 1 the direct one.
+    AnglePath,
+    /// Electrical power of the motors, percent.
+    MotorPower,
+    /// Whether the gimbal sends HEARTBEAT.
+    HeartbeatEmit,
+    /// Rates of the old table, hertz.
+    StatusRate,
+    EncoderRate,
+    OrientationRate,
+    ImuRate,
+}
+
+impl Parameter {
+    /// The values that are taken; narrower limits of single models are the gimbal's to enforce.
+    ///
+    /// The vendor's SDK carries settings as one byte and limits as whole degrees. How far limits may go is not
+    /// published; the widest sample is ±320° of pan.
+    pub const fn range(self) -> RangeInclusive<i16> {
+        match self {
+            Self::VersionX | Self::VersionY | Self::VersionZ => 0..=255,
+            Self::LimitMin(Axis::Pan) | Self::LimitMax(Axis::Pan) => -360..=360,
+            Self::LimitMin(_) | Self::LimitMax(_) => -180..=180,
+            Self::EncoderType | Self::AdaptiveControl | Self::AnglePath | Self::HeartbeatEmit => 0..=1,
+            Self::MotorPower => 50..=100,
+            Self::StatusRate | Self::EncoderRate | Self::OrientationRate | Self::ImuRate => 0..=200,
+            Self::RcType => 0..=31,
+            Self::AxisFlags
+            | Self::Stiffness(_)
+            | Self::HoldStrength(_)
+            | Self::Gain
+            | Self::OutputFilter
+            | Self::GyroFilter
+            | Self::FollowSpeed(_)
+            | Self::FollowSmoothing(_)
+            | Self::FollowWindow(_)
+            | Self::ControlSpeed(_)
+            | Self::ControlSmoothing(_) => 0..=255,
+        }
+    }
+}
+
+impl fmt::Display for Parameter {
+    /// As in `follow speed of the pan axis`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (what, axis) = match self {
+            Self::VersionX => ("first number of the version", None),
+            Self::VersionY => ("second number of the version", None),
+            Self::VersionZ => ("third number of the version", None),
+            Self::Stiffness(axis) => ("stiffness", Some(axis)),
+            Self::HoldStrength(axis) => ("hold strength", Some(axis)),
+            Self::Gain => ("gain", None),
+            Self::OutputFilter => ("output filter", None),
+            Self::GyroFilter => ("gyro filter", None),
+            Self::FollowSpeed(axis) => ("follow speed", Some(axis)),
+            Self::FollowSmoothing(axis) => ("follow smoothing", Some(axis)),
+            Self::FollowWindow(axis) => ("follow window", Some(axis)),
+            Self::ControlSpeed(axis) => ("control speed", Some(axis)),
+            Self::ControlSmoothing(axis) => ("control smoothing", Some(axis)),
+            Self::LimitMin(axis) => ("smaller limit", Some(axis)),
+            Self::LimitMax(axis) => ("larger limit", Some(axis)),
+            Self::AxisFlags => ("axis flags", None),
+            Self::RcType => ("RC type", None),
+            Self::EncoderType => ("encoder type", None),
+            Self::AdaptiveControl => ("adaptive control", None),
+            Self::AnglePath => ("angle path", None),
+            Self::MotorPower => ("motor power", None),
+            Self::HeartbeatEmit => ("emission of heartbeats", None),
+            Self::StatusRate => ("rate of the status", None),
+            Self::EncoderRate => ("rate of the encoders", None),
+            Self::OrientationRate => ("rate of the orientation", None),
+            Self::ImuRate => ("rate of the IMU", None),
+        };
+        f.write_str(what)?;
+        axis.map_or(Ok(()), |axis| write!(f, " of the {} axis", axis.name()))
+    }
+}
+
+/// One parameter to set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ParameterWrite {
+    pub name: &'static str,
+    pub value: i16,
+}
+
+/// Why a setting cannot be made.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ParameterError {
+    #[error("gimbals with this firmware have no {0}")]
+    Missing(Parameter),
+    #[error("the {parameter} is to be from {} to {}, not {value}", .parameter.range().start(), .parameter.range().end())]
+    OutOfRange { parameter: Parameter, value: i32 },
+    #[error("{0} shares a parameter with other settings, and that has not been read yet")]
+    Unread(Parameter),
+    #[error("the smaller limit ({min}) is above the larger ({max})")]
+    Crossed { min: i16, max: i16 },
+}
+
+/// `value` for `parameter` under its name in `table`.
+pub fn write(table: ParameterTable, parameter: Parameter, value: i16) -> Result<ParameterWrite, ParameterError> {
+    let name = table.name(parameter).ok_or(ParameterError::Missing(parameter))?;
+    if !parameter.range().contains(&value) {
+        return Err(ParameterError::OutOfRange { parameter, value: i32::from(value) });
+    }
+    Ok(ParameterWrite { name, value })
+}
+
+/// `PARAM_SET` for `device`.
+pub fn parameter_set(device: MavId, write: ParameterWrite) -> PARAM_SET_DATA {
+    PARAM_SET_DATA {
+        param_value: f32::from(write.value),
+        target_system: device.system,
+        target_component: device.component,
+        param_id: CharArray::from(write.name),
+        param_type: INT16,
+    }
+}
+
+/// The number in a `PARAM_VALUE`; `None` when it is none that an int16 can be.
+pub fn parameter_value(param_value: f32) -> Option<i16> {
+    let rounded = param_value.round();
+    // NaN is in no range.
+    (f32::from(i16::MIN)..=f32::from(i16::MAX)).contains(&rounded).then_some(rounded as i16)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::encode_to_vec;
+
+    /// Gimbal statement 13: "PARAM_SET writes an int16 number as its float value with param_type 4; the golden
+    /// PARAM_SET frame matches."
+    #[test]
+    fn statement_13_a_parameter_is_set_as_the_golden_frame_has_it() {
+        let write = write(ParameterTable::New, Parameter::LimitMax(Axis::Tilt), 45).expect("in range");
+        assert_eq!(write, ParameterWrite { name: "RC_LIM_MAX_TILT", value: 45 });
+
+        #[rustfmt::skip]
+        let golden = [
+            0xfd, 0x17, 0x00, 0x00, 0x09, 0x01, 0xbf, 0x17, 0x00, 0x00, 0x00, 0x00, 0x34, 0x42, 0x01, 0x9a, 0x52, 0x43,
+            0x5f, 0x4c, 0x49, 0x4d, 0x5f, 0x4d, 0x41, 0x58, 0x5f, 0x54, 0x49, 0x4c, 0x54, 0x00, 0x04, 0x6a, 0xa1,
+        ];
+        assert_eq!(encode_to_vec(MavId::new(1, 191), 9, &parameter_set(MavId::new(1, 154), write)), golden);
+    }
+
+    #[test]
+    fn values_are_read_as_numbers() {
+        for (sent, expected) in [
+            (45.0, Some(45)),
+            (-90.0, Some(-90)),
+            (32_767.0, Some(i16::MAX)),
+            (32_768.0, None),
+            (f32::NAN, None),
+            (f32::INFINITY, None),
+        ] {
+            assert_eq!(parameter_value(sent), expected, "{sent}");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_set_is_named() {
+        let error = |table, parameter, value| write(table, parameter, value).expect_err("an error").to_string();
+
+        assert_eq!(error(ParameterTable::Old, Parameter::RcType, 7), "gimbals with this firmware have no RC type");
+        assert_eq!(
+            error(ParameterTable::New, Parameter::ControlSpeed(Axis::Pan), 256),
+            "the control speed of the pan axis is to be from 0 to 255, not 256"
+        );
+    }
+}
