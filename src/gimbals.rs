@@ -10,6 +10,7 @@ pub mod gremsy;
 pub mod mavlink_v1;
 pub mod mavlink_v2;
 pub mod operation;
+pub mod parameters;
 pub mod report;
 pub mod setpoint;
 pub mod settings;

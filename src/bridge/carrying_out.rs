@@ -28,7 +28,8 @@ impl Bridge {
                 let component = self.roster.get_mut(at).component;
                 match output {
                     GimbalOutput::Driver(DriverOutput::Message(message)) => {
-                        let device = self.roster.get_mut(at).manager.device();
+                        // Also before the manager is told that it is there.
+                        let device = self.roster.get_mut(at).adopted;
                         let channels = device.map_or(ChannelSet::EMPTY, |device| self.channels_of_device(device));
                         self.send(now, channels, component, &message);
                     }

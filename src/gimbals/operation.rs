@@ -15,6 +15,8 @@ pub enum Operation {
     /// Switches the motors; without them the camera falls to where its weight takes it.
     Motors(Motors),
     Restart(Restart),
+    /// Holds the camera where it looks, yaw to the vehicle's nose or to North.
+    SetYawMode(YawMode),
     /// Looks straight down with the picture's top towards the nose, for surveys.
     Mapping,
     Reset(ResetMode),
@@ -69,6 +71,15 @@ pub enum Motors {
 pub enum Restart {
     Reboot,
     Shutdown,
+}
+
+/// What yaw is kept to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum YawMode {
+    /// The vehicle's nose.
+    Follow,
+    /// North, or where the gimbal takes it to be.
+    Lock,
 }
 
 /// Where a reset turns the camera.
