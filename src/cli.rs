@@ -99,10 +99,11 @@ Examples:
   gimbald scan                                   every serial device
   gimbald scan /dev/ttyUSB0
 
-A port that a running 'gimbald run' or another program holds is left alone. On the others every usual baud rate is
-tried for about 2.5 seconds, so a port where nobody answers takes 20 seconds. A gimbal may be silent until it hears
-somebody, so a HEARTBEAT is sent (as onboard controller, system 1, component 191), and whoever was heard is asked for
-GIMBAL_DEVICE_INFORMATION. Nothing is sent that moves anything.
+A port that a running 'gimbald run' or another program holds is left alone; a running gimbald is asked what is there. On
+the others every usual baud rate is tried for about 2.5 seconds, so a port where nobody answers takes 20 seconds. A gimbal
+may be silent until it hears somebody, so HEARTBEAT is sent (from system 1, component 191, as onboard controller and as
+a vehicle of no kind, in turn), whoever was heard is asked for GIMBAL_DEVICE_INFORMATION, and gimbals that do not answer
+for parameters of certain makes. Nothing is sent that moves anything.
 Exit codes: 0 when something answered, 69 when not, 64 for a DEVICE that is no serial port.")]
     Scan(ScanArgs),
 }
@@ -249,6 +250,10 @@ pub struct ScanArgs {
     /// The serial device to try; every one when it is left out
     #[arg(value_name = "DEVICE")]
     pub device: Option<PathBuf>,
+
+    /// Where the page of a running daemon is, which is asked first
+    #[arg(long, value_name = "URL", default_value_t = format!("http://{}", HttpSettings::DEFAULT_LISTEN))]
+    pub url: String,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -16,8 +16,8 @@ use self::conversation::{Conversation, Party};
 use self::ports::{Port, PortError};
 use super::status::{self, StatusError};
 use crate::bridge::settings::Role;
+use crate::bridge::snapshot::{GimbalSnapshot, LinkSnapshot};
 use crate::cli::ScanArgs;
-use crate::config::settings::HttpSettings;
 use crate::daemon::clock::Clock;
 use crate::endpoint::Endpoint;
 use crate::exit_code::ExitCode;
@@ -53,8 +53,7 @@ impl ScanError {
 
 /// Tries the ports one after the other; findings go to `output`, progress and problems to `errors`.
 pub fn scan(arguments: &ScanArgs, output: &mut impl Write, errors: &mut impl Write) -> ExitCode {
-    let daemon = format!("http://{}", HttpSettings::DEFAULT_LISTEN);
-    match run(arguments.device.as_deref(), &daemon, output, errors) {
+    match run(arguments.device.as_deref(), &arguments.url, output, errors) {
         Ok(()) => ExitCode::Ok,
         Err(error) => {
             say(errors, format_args!("gimbald scan: {error}"));
@@ -77,10 +76,13 @@ fn run(device: Option<&Path>, daemon: &str, output: &mut impl Write, errors: &mu
     runtime.map_err(ScanError::Runtime)?.block_on(async {
         let held = held_by_daemon(daemon, errors).await;
         let mut names = Names::default();
+        let mut told = false;
         for port in ports {
             let shown = port.name.display();
-            if held.contains(&port.device) {
-                say(errors, format_args!("{shown}: left alone, it belongs to the running gimbald"));
+            if let Some(held) = held.iter().find(|held| held.device == port.device) {
+                say(errors, format_args!("{shown}: left alone, it belongs to the running gimbald, which says:"));
+                say(output, format_args!("{held}"));
+                told |= !held.gimbals.is_empty();
                 continue;
             }
             match try_port(&port, errors).await {
@@ -96,26 +98,59 @@ fn run(device: Option<&Path>, daemon: &str, output: &mut impl Write, errors: &mu
                 Err(error) => say(errors, format_args!("{shown}: {error}")),
             }
         }
-        if names.0.is_empty() { Err(ScanError::NothingAnswered) } else { Ok(()) }
+        if names.0.is_empty() && !told { Err(ScanError::NothingAnswered) } else { Ok(()) }
     })
 }
 
-/// The devices of the daemon's serial links, which it opens again whenever they are free.
-async fn held_by_daemon(url: &str, errors: &mut impl Write) -> Vec<PathBuf> {
+/// The daemon's serial links, whose ports it opens again whenever they are free.
+async fn held_by_daemon(url: &str, errors: &mut impl Write) -> Vec<Held> {
     match status::snapshot(url).await {
-        Ok(snapshot) => {
-            let paths = snapshot.links.into_iter().filter_map(|link| match link.endpoint.parse() {
-                Ok(Endpoint::Serial { path, .. }) => Some(path),
-                Ok(_) | Err(_) => None,
-            });
-            // A path that leads nowhere leads to none of the ports that are there.
-            paths.filter_map(|path| Port::at(Path::new(&path)).ok()).map(|port| port.device).collect()
-        }
+        Ok(snapshot) => snapshot.links.iter().filter_map(|link| Held::of_link(link, &snapshot.gimbals)).collect(),
         Err(StatusError::Unreachable { .. }) => Vec::new(),
         Err(error) => {
             say(errors, format_args!("which ports a running gimbald has cannot be asked ({error}); locks tell"));
             Vec::new()
         }
+    }
+}
+
+/// A port of the running daemon, and what that knows of it.
+#[derive(Debug)]
+struct Held {
+    device: PathBuf,
+    path: String,
+    baud: u32,
+    /// `up` or `down`.
+    state: String,
+    gimbals: Vec<GimbalSnapshot>,
+}
+
+impl Held {
+    fn of_link(link: &LinkSnapshot, gimbals: &[GimbalSnapshot]) -> Option<Self> {
+        let Ok(Endpoint::Serial { path, baud }) = link.endpoint.parse() else { return None };
+        // A path that leads nowhere leads to none of the ports that are there.
+        let device = Port::at(Path::new(&path)).ok()?.device;
+        let heard: Vec<&String> = link.peers.iter().flat_map(|peer| &peer.components).collect();
+        let is_there = |gimbal: &&GimbalSnapshot| gimbal.device.as_ref().is_some_and(|device| heard.contains(&device));
+        let gimbals = gimbals.iter().filter(is_there).cloned().collect();
+        Some(Self { device, path, baud, state: link.state.clone(), gimbals })
+    }
+}
+
+impl fmt::Display for Held {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {} baud, {}", self.path, self.baud, status::printable_text(&self.state))?;
+        for gimbal in &self.gimbals {
+            let generation = gimbal.details.generation.iter();
+            let product = [&gimbal.vendor, &gimbal.model].into_iter().flatten();
+            let firmware = gimbal.firmware.iter().map(|version| format!("firmware {version}"));
+            let family = [gimbal.family.as_str()].into_iter().chain(generation.map(String::as_str)).collect::<Vec<_>>();
+            let told = product.cloned().chain(firmware).chain([gimbal.state.clone()]);
+            let told = [family.join(" ")].into_iter().chain(told).collect::<Vec<_>>().join(", ");
+            let device = gimbal.device.as_deref().unwrap_or_default();
+            write!(f, "\n  {}: {}", status::printable_text(device), status::printable_text(&told))?;
+        }
+        Ok(())
     }
 }
 
@@ -205,7 +240,7 @@ impl Finding {
         let any = |is: fn(&Party) -> bool| self.parties.values().any(is);
         if any(Party::is_autopilot) {
             Role::Autopilot
-        } else if any(|party| party.is_gimbal_device) {
+        } else if any(Party::is_gimbal) {
             Role::Gimbal
         } else if any(Party::is_ground_station) {
             Role::Ground
@@ -229,10 +264,13 @@ impl Finding {
 
 impl fmt::Display for Party {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if !self.is_gimbal_device {
-            return write!(f, "MAVLink, no gimbal device");
+        if !self.is_gimbal() {
+            return write!(f, "MAVLink, no gimbal");
         }
-        write!(f, "mavlink_v2")?;
+        if self.is_doubtful() {
+            return write!(f, "a gimbal that only beats: mavlink_v1, or a mavlink_v2 that is still starting");
+        }
+        write!(f, "{}", self.speaks())?;
         let Some(identity) = &self.identity else { return write!(f, ", which does not tell its make") };
         for name in [&identity.vendor, &identity.model, &identity.custom_name] {
             if !name.is_empty() {
@@ -415,19 +453,20 @@ mod tests {
         result.expect("it answers");
         let shown = autopilot.path.display();
         let expected = format!(
-            "{shown}: 115200 baud\n  1/1: MAVLink, no gimbal device\n\n\
+            "{shown}: 115200 baud\n  1/1: MAVLink, no gimbal\n\n\
              [[link]]\nname = \"autopilot\"\nrole = \"autopilot\"\nendpoint = \"serial:{shown}:115200\"\n\n"
         );
         assert_eq!(output, expected);
         autopilot.end();
     }
 
-    /// "Never opens those."
+    /// "It asks a running daemon first and never opens a port that a process holds."
     #[test]
     fn a_port_of_the_running_daemon_is_left_alone() {
         let mut gimbal = Plugged::new(Device::new(Timestamp::ZERO, DeviceSettings::default()), 1);
         let mut snapshot = crate::http::canned::snapshot();
         snapshot.links[0].endpoint = format!("serial:{}:57600", gimbal.path.display());
+        snapshot.links[0].peers[0].components = vec!["1/154".to_owned()];
         let body = serde_json::to_string(&snapshot).expect("JSON");
         let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
         let daemon = format!("http://{}", listener.local_addr().expect("it is bound"));
@@ -447,12 +486,11 @@ mod tests {
         let (result, output, errors) = gimbal.scan(&gimbal.path, &daemon);
 
         server.join().expect("no panic");
-        let error = result.expect_err("left alone");
-        assert_eq!(
-            (error.exit_code(), error.to_string().as_str(), output.as_str()),
-            (ExitCode::Unavailable, "nothing answered", "")
-        );
-        assert_eq!(errors, format!("{}: left alone, it belongs to the running gimbald\n", gimbal.path.display()));
+        result.expect("the daemon knows it");
+        let shown = gimbal.path.display();
+        let expected = format!("{shown}: 57600 baud, up\n  1/154: mavlink_v2 v2, Acme, Pixy, firmware 7.8.1, alive\n");
+        assert_eq!(output, expected);
+        assert_eq!(errors, format!("{shown}: left alone, it belongs to the running gimbald, which says:\n"));
         assert_eq!(gimbal.end(), 0);
     }
 

@@ -9,3 +9,8 @@ pub mod parameters;
 pub mod readings;
 pub mod status;
 pub mod version;
+
+/// Whether `GIMBAL_DEVICE_INFORMATION` with that vendor is a Gremsy's.
+pub fn is_vendor(vendor: &str) -> bool {
+    vendor.trim().eq_ignore_ascii_case("gremsy")
+}

@@ -1,16 +1,23 @@
 //! What is said to find out who is at the other end of a line, and what is made of the answers.
 //!
 //! A plain value: bytes and the time go in, frames come out. Sends HEARTBEAT and, to those that were heard, a request
-//! for `GIMBAL_DEVICE_INFORMATION`; nothing that moves anything.
+//! for `GIMBAL_DEVICE_INFORMATION`; a gimbal that does not answer it is asked for parameters that only certain makes
+//! have. Nothing is sent that moves anything.
+//!
+//! A v1 gimbal waits for the heartbeat of a vehicle, so every other heartbeat has `MAV_TYPE_GENERIC`, with
+//! `MAV_AUTOPILOT_INVALID` as the others: nobody takes it for an autopilot.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
+use crate::gimbals::gremsy;
+use crate::gimbals::gremsy::parameters::ParameterTable;
 use crate::gimbals::mavlink_v2::packet;
 use crate::gimbals::report::Identity;
+use crate::gimbals::settings::Family;
 use crate::timestamp::Timestamp;
 use crate::wire::decoder::Patience;
-use crate::wire::dialect::{HEARTBEAT_DATA, MavMessage};
+use crate::wire::dialect::{CharArray, HEARTBEAT_DATA, MavMessage, PARAM_REQUEST_READ_DATA, PARAM_VALUE_DATA};
 use crate::wire::ids::{component, mav_autopilot, mav_state, mav_type, message};
 use crate::wire::{Frame, FrameBuffer, MavId, StreamDecoder, Target};
 
@@ -23,7 +30,8 @@ pub const SILENCE: Duration = Duration::from_millis(2_500);
 const INTRODUCTION: Duration = Duration::from_millis(2_500);
 /// How long others on the line have to show themselves when a gimbal has told what it is.
 const OTHERS: Duration = Duration::from_millis(1_100);
-const HEARTBEAT_INTERVAL: Duration = Duration::from_secs(1);
+/// Each kind of heartbeat once a second.
+const HEARTBEAT_INTERVAL: Duration = Duration::from_millis(500);
 const REQUEST_INTERVAL: Duration = Duration::from_millis(500);
 
 /// One attempt at one baud rate.
@@ -34,6 +42,8 @@ pub struct Conversation {
     heartbeat_at: Timestamp,
     /// Nothing is asked before somebody was heard.
     request_at: Option<Timestamp>,
+    /// The next heartbeat is that of a vehicle.
+    as_vehicle: bool,
     sequence: u8,
     unsent: VecDeque<Vec<u8>>,
     /// To know an echo.
@@ -47,9 +57,13 @@ pub struct Party {
     frames: u32,
     /// `MAV_TYPE` and `MAV_AUTOPILOT`.
     heartbeat: Option<(u8, u8)>,
-    /// 283 or 285 was heard from it.
+    /// 283 or 285 about itself was heard from it.
     pub is_gimbal_device: bool,
     pub identity: Option<Identity>,
+    /// It told where it looks by a message of v1.
+    tells_v1_attitude: bool,
+    /// Which of the parameters it has that only Gremsy gimbals have.
+    table: Option<ParameterTable>,
 }
 
 impl Party {
@@ -64,6 +78,31 @@ impl Party {
         })
     }
 
+    /// Whether it is a gimbal, whatever it speaks.
+    pub fn is_gimbal(&self) -> bool {
+        self.is_gimbal_device || self.table.is_some() || self.beats_as_gimbal()
+    }
+
+    fn beats_as_gimbal(&self) -> bool {
+        self.heartbeat.is_some_and(|(kind, _)| kind == mav_type::GIMBAL)
+    }
+
+    /// What it speaks, and which generation of that.
+    pub fn speaks(&self) -> &'static str {
+        let is_gremsy = self.identity.as_ref().is_some_and(|identity| gremsy::is_vendor(&identity.vendor));
+        match (is_gremsy || self.table.is_some(), self.is_gimbal_device) {
+            (true, true) => "gremsy v2",
+            (true, false) => "gremsy v1",
+            (false, true) => Family::MavlinkV2.name(),
+            (false, false) => Family::MavlinkV1.name(),
+        }
+    }
+
+    /// Nothing that it said tells a v1 gimbal from a v2 device that has not answered yet.
+    pub fn is_doubtful(&self) -> bool {
+        self.beats_as_gimbal() && !self.is_gimbal_device && self.table.is_none() && !self.tells_v1_attitude
+    }
+
     pub fn is_ground_station(&self) -> bool {
         self.heartbeat.is_some_and(|(kind, _)| kind == mav_type::GCS)
     }
@@ -76,6 +115,7 @@ impl Conversation {
             ends_at: now + SILENCE,
             heartbeat_at: now,
             request_at: None,
+            as_vehicle: false,
             sequence: 0,
             unsent: VecDeque::new(),
             sent: Vec::new(),
@@ -95,16 +135,18 @@ impl Conversation {
             self.heartbeat_at = now + HEARTBEAT_INTERVAL;
             self.send(&MavMessage::HEARTBEAT(HEARTBEAT_DATA {
                 custom_mode: 0,
-                mavtype: mav_type::ONBOARD_CONTROLLER,
+                mavtype: if self.as_vehicle { mav_type::GENERIC } else { mav_type::ONBOARD_CONTROLLER },
                 autopilot: mav_autopilot::INVALID,
                 base_mode: 0,
                 system_status: mav_state::ACTIVE,
                 mavlink_version: 3,
             }));
+            self.as_vehicle = !self.as_vehicle;
         }
         if self.request_at.is_some_and(|at| now >= at) {
             self.request_at = Some(now + REQUEST_INTERVAL);
             self.send(&packet::request_message(Target::Everyone, message::GIMBAL_DEVICE_INFORMATION));
+            self.ask_parameters();
         }
     }
 
@@ -138,6 +180,22 @@ impl Conversation {
         self.decoder = decoder;
     }
 
+    /// Asks those that beat as gimbals and have not said more for the parameters by which their make is known.
+    fn ask_parameters(&mut self) {
+        let silent = |party: &Party| party.beats_as_gimbal() && !party.is_gimbal_device && party.table.is_none();
+        let asked: Vec<MavId> = self.parties.iter().filter(|(_, party)| silent(party)).map(|(id, _)| *id).collect();
+        for device in asked {
+            for name in ParameterTable::TELLING_NAMES {
+                self.send(&MavMessage::PARAM_REQUEST_READ(PARAM_REQUEST_READ_DATA {
+                    param_index: -1,
+                    target_system: device.system,
+                    target_component: device.component,
+                    param_id: CharArray::from(name),
+                }));
+            }
+        }
+    }
+
     fn note(&mut self, now: Timestamp, frame: &Frame<'_>) {
         if self.request_at.is_none() {
             self.request_at = Some(now);
@@ -154,8 +212,18 @@ impl Conversation {
             }
             party.identity = Some(information.identity);
         }
-        party.is_gimbal_device |=
-            matches!(frame.message_id(), message::GIMBAL_DEVICE_INFORMATION | message::GIMBAL_DEVICE_ATTITUDE_STATUS);
+        match frame.message_id() {
+            message::GIMBAL_DEVICE_INFORMATION | message::GIMBAL_DEVICE_ATTITUDE_STATUS => {
+                party.is_gimbal_device = true;
+            }
+            message::MOUNT_ORIENTATION | message::MOUNT_STATUS => party.tells_v1_attitude = true,
+            message::PARAM_VALUE => {
+                let value = frame.decode::<PARAM_VALUE_DATA>();
+                let name = value.as_ref().and_then(|value| value.param_id.to_str().ok());
+                party.table = party.table.or(ParameterTable::recognised_by(name));
+            }
+            _ => {}
+        }
     }
 
     fn send(&mut self, message: &MavMessage) {
@@ -169,6 +237,7 @@ impl Conversation {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gimbals::mavlink_v1::sim as v1;
     use crate::gimbals::mavlink_v2::sim::{Device, DeviceSettings};
     use crate::sim::peer::Peer;
     use crate::sim::vehicle::{Vehicle, VehicleSettings};
@@ -260,6 +329,21 @@ mod tests {
         assert!(end < Timestamp::ZERO + SILENCE, "{end:?}");
     }
 
+    /// "Wait for a HEARTBEAT. Ignore type 6 (GCS); accept 1, 2 and other vehicle types": it is woken, and known by what it
+    /// says of its attitude.
+    #[test]
+    fn a_v1_gimbal_that_waits_for_a_vehicle_is_found() {
+        for (feedback, doubtful) in [(v1::Feedback::Orientation, false), (v1::Feedback::Nothing, true)] {
+            let settings = v1::DeviceSettings { feedback, ..v1::DeviceSettings::default() };
+            let (end, parties, _) = run(v1::Device::new(Timestamp::ZERO, settings));
+
+            let party = &parties[&MavId::new(1, component::GIMBAL)];
+            assert!(party.is_gimbal() && !party.is_gimbal_device);
+            assert_eq!((party.speaks(), party.is_doubtful()), ("mavlink_v1", doubtful));
+            assert!(end <= Timestamp::ZERO + SILENCE + INTRODUCTION, "{end:?}");
+        }
+    }
+
     #[test]
     fn an_autopilot_is_no_gimbal() {
         let (end, parties, _) = run(Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
@@ -275,7 +359,7 @@ mod tests {
         let (end, parties, sent) = run(Nobody);
 
         assert_eq!((end, parties), (Timestamp::ZERO + SILENCE, BTreeMap::new()));
-        assert_eq!(ids(&sent), [message::HEARTBEAT; 3]);
+        assert_eq!(ids(&sent), [message::HEARTBEAT; 6]);
     }
 
     #[test]
@@ -283,7 +367,7 @@ mod tests {
         let (end, parties, sent) = run(Echo::default());
 
         assert_eq!((end, parties), (Timestamp::ZERO + SILENCE, BTreeMap::new()));
-        assert_eq!(ids(&sent), [message::HEARTBEAT; 3]);
+        assert_eq!(ids(&sent), [message::HEARTBEAT; 6]);
     }
 
     /// "Nothing that moves anything is ever sent."
@@ -300,7 +384,8 @@ mod tests {
                 requests += 1;
             } else {
                 let heartbeat: HEARTBEAT_DATA = frame.decode().expect("a heartbeat or a request");
-                assert_eq!((heartbeat.mavtype, heartbeat.autopilot, heartbeat.base_mode), (18, 8, 0));
+                assert!(matches!(heartbeat.mavtype, 18 | 0), "{heartbeat:?}");
+                assert_eq!((heartbeat.autopilot, heartbeat.base_mode), (8, 0));
             }
         }
         assert!(requests > 0);

@@ -21,6 +21,9 @@ pub struct Row {
 }
 
 impl ParameterTable {
+    /// Names that only one of the tables has, and no other make that is known: whoever answers to one is a Gremsy.
+    pub const TELLING_NAMES: [&str; 2] = ["STIFF_TILT", "PITCH_P"];
+
     /// The table whose names these are, by the names that only one of them has; `None` for a gimbal that lists neither.
     pub fn recognised_by<'a>(names: impl IntoIterator<Item = &'a str>) -> Option<Self> {
         names.into_iter().find_map(|name| match name {
