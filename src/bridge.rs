@@ -5,6 +5,7 @@
 
 mod allowance;
 mod announcements;
+mod asked;
 mod autopilot;
 mod carrying_out;
 mod channels;
@@ -33,8 +34,9 @@ mod streams;
 mod transactions;
 
 pub use crate::channel::{ChannelId, ChannelSet};
-use crate::gimbals::operation::{OperationId, OperationResult};
+use crate::gimbals::operation::OperationId;
 use crate::manager::Surroundings;
+use crate::manager::asked::{Answer, Asked};
 use crate::manager::rank::Ranks;
 use crate::router::Router;
 use crate::timers::TimerTable;
@@ -42,6 +44,7 @@ use crate::timestamp::Timestamp;
 use crate::vehicle::Vehicle;
 use crate::wire::{FrameBuffer, MavId};
 use announcements::Announcements;
+use asked::UnderWay;
 use channels::Channels;
 use conflicts::Conflicts;
 use events::Events;
@@ -89,19 +92,26 @@ pub enum Input<'a> {
         frames: u32,
         reason: &'static str,
     },
+    /// Somebody outside MAVLink who may asks something of the gimbal of that name; each is answered by exactly one
+    /// [`Output::Answered`].
+    Asked {
+        id: OperationId,
+        gimbal: &'a str,
+        asked: &'a Asked,
+    },
     /// The process is to end: stop what moves, say goodbye.
     Shutdown,
 }
 
 /// What is to be done.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Output<'a> {
     /// Send one whole frame to each of `channels`.
     Transmit { channels: ChannelSet, bytes: &'a [u8] },
     /// Keep the adopted system id for the next start.
     StoreSystemId(u8),
-    /// What became of an operation.
-    Operated { id: OperationId, result: &'a OperationResult },
+    /// What became of something asked.
+    Answered { id: OperationId, answer: &'a Answer },
 }
 
 /// The core.
@@ -129,6 +139,7 @@ pub struct Bridge {
     announcements: Announcements,
     stations: Stations,
     watch: RivalWatch,
+    asked: UnderWay,
     outbox: Outbox,
     buffer: FrameBuffer,
     timers: TimerTable<Timer>,
@@ -172,6 +183,7 @@ impl Bridge {
             conflicts: Conflicts::new(settings.links.iter().map(|link| link.name.clone()).collect()),
             stations: Stations::default(),
             watch: RivalWatch::default(),
+            asked: UnderWay::default(),
             outbox: Outbox::default(),
             buffer: FrameBuffer::default(),
             timers: TimerTable::default(),
@@ -210,6 +222,7 @@ impl Bridge {
                     self.count_dropped_towards(channel, reason);
                 }
             }
+            Input::Asked { id, gimbal, asked } => self.handle_asked(now, id, gimbal, asked),
             Input::Shutdown => self.shut_down(now),
         }
         self.carry_out(now);
@@ -231,6 +244,7 @@ impl Bridge {
             }
         }
         self.transactions.handle_timeout(now);
+        self.give_up_asked(now);
         self.ask_autopilot(now);
         self.tell_gimbals_state(now);
         self.measure_round_trip(now);
@@ -263,6 +277,7 @@ impl Bridge {
             self.channels.poll_timeout(),
             self.streams.poll_timeout().filter(|_| self.may_ask_autopilot()),
             self.transactions.poll_timeout(),
+            self.asked.poll_timeout(),
             self.state_for_gimbals.poll_timeout(),
             self.timesync_due(),
         ];
@@ -321,6 +336,7 @@ impl Bridge {
                 }
             }
         }
+        self.asked.end_all(&mut self.outbox);
         self.shutting_down = true;
     }
 

@@ -1,6 +1,7 @@
 //! The process around the core: clock, links, log, state file, service manager, and the window that others see it
 //! through.
 
+mod askers;
 mod channels;
 pub mod clock;
 mod event_loop;

@@ -3,6 +3,7 @@
 //! Implements the manager side of the MAVLink Gimbal Protocol v2 for one gimbal. The rules stand in files of their own
 //! ([`control`], [`tracking`], [`intervals`]); this machine puts them in order.
 
+pub mod asked;
 pub mod control;
 pub mod events;
 pub mod intervals;
@@ -20,7 +21,7 @@ mod heading;
 mod inquiries;
 mod mount;
 mod ownership;
-mod roi;
+pub mod roi;
 mod telling;
 
 use std::collections::{BTreeMap, VecDeque};
@@ -29,6 +30,7 @@ use std::time::Duration;
 use crate::channel::{ChannelId, ChannelSet};
 use crate::geometry::{Angle, Position};
 use crate::gimbals::capabilities::Capabilities;
+use crate::gimbals::operation::{Operation, OperationId};
 use crate::gimbals::report::{GimbalStatus, Identity};
 use crate::gimbals::setpoint::{Setpoint, Turning};
 use crate::gimbals::settings::GimbalSettings;
@@ -98,6 +100,11 @@ pub enum ManagerOutput {
         channels: Option<ChannelSet>,
     },
     Steer(Setpoint),
+    /// For the driver; it answers.
+    Operate {
+        id: OperationId,
+        operation: Operation,
+    },
     /// For whoever looks.
     Event(Event),
 }
@@ -155,6 +162,8 @@ pub struct GimbalManager {
     told_can_aim: bool,
     last_command: Option<LastCommand>,
     configured_inputs: ConfiguredInputs,
+    /// What is being done in the place of where the gimbal was told to look: it is not told that again meanwhile.
+    paused_by: Option<OperationId>,
     rejected: BTreeMap<MavId, BTreeMap<&'static str, u64>>,
     outputs: VecDeque<ManagerOutput>,
 }
@@ -187,6 +196,7 @@ impl GimbalManager {
             told_can_aim: false,
             last_command: None,
             configured_inputs: ConfiguredInputs::default(),
+            paused_by: None,
             rejected: BTreeMap::new(),
             outputs: VecDeque::new(),
         }
@@ -290,7 +300,8 @@ impl GimbalManager {
         // Without a device there is nothing to tell of.
         let schedules = schedules.into_iter().flatten().filter(|_| self.device.is_some());
         let lease = self.rules.lease_timeout;
-        let rest = [self.tracking.poll_timeout(), self.control.poll_timeout(lease), self.source_lost_at()];
+        let tracking = self.tracking.poll_timeout().filter(|_| self.paused_by.is_none());
+        let rest = [tracking, self.control.poll_timeout(lease), self.source_lost_at()];
         schedules.chain(rest.into_iter().flatten()).min()
     }
 
@@ -388,7 +399,7 @@ impl GimbalManager {
             let who = self.tracking.source();
             self.tell(if roi.is_some() { Event::RoiStarted { who } } else { Event::RoiEnded { who } });
         }
-        if let Some(capabilities) = self.capabilities {
+        if let Some(capabilities) = self.capabilities.filter(|_| self.paused_by.is_none()) {
             let situation = self.situation(now, &capabilities, around);
             if let Some(setpoint) = self.tracking.steer(now, &situation) {
                 self.outputs.push_back(ManagerOutput::Steer(setpoint));

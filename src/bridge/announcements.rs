@@ -6,7 +6,7 @@ use super::allowance::Allowance;
 use crate::gimbals::settings::Takeover;
 use crate::manager::DeviceState;
 use crate::manager::control::{Change, How, Place};
-use crate::manager::events::Event;
+use crate::manager::events::{Event, Names};
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 use crate::wire::ids::severity;
@@ -62,6 +62,7 @@ pub struct Announcement {
 pub struct Subject<'a> {
     pub manager: u8,
     pub name: &'a str,
+    pub names: Names,
     pub takeover: Takeover,
 }
 
@@ -74,28 +75,29 @@ impl Default for Announcements {
 impl Announcements {
     /// What is said of `event`. That a gimbal is lost or back is said by [`handle_state`](Self::handle_state).
     pub fn handle_event(&mut self, now: Timestamp, subject: Subject<'_>, event: &Event) -> Option<Announcement> {
+        let name = |id| subject.names.of(id);
         let (kind, who, text) = match *event {
             Event::Control(Change { place: Place::Primary, how, who, from: Some(from), to: Some(to) }) => match how {
                 How::Borrowed => (Kind::Borrowed, who, "autopilot borrowed control".to_owned()),
-                How::Restored => (Kind::GivenBack, to, format!("autopilot gave control back to {to}")),
-                How::TakenOver => (Kind::TakenOver, to, format!("{to} took control from {from}")),
+                How::Restored => (Kind::GivenBack, to, format!("autopilot gave control back to {}", name(to))),
+                How::TakenOver => (Kind::TakenOver, to, format!("{} took control from {}", name(to), name(from))),
                 _ => return None,
             },
             Event::Control(Change { place: Place::Primary, how: How::Restored, to: Some(to), .. }) => {
-                (Kind::GivenBack, to, format!("autopilot gave control back to {to}"))
+                (Kind::GivenBack, to, format!("autopilot gave control back to {}", name(to)))
             }
             Event::AcquireWar { holder, .. } => {
-                (Kind::AcquireWar, holder, format!("acquire war, {holder} keeps control"))
+                (Kind::AcquireWar, holder, format!("acquire war, {} keeps control", name(holder)))
             }
             // Of the war itself it was told.
             Event::Refused { reason: "acquire_war", .. } => return None,
             // An exclusive holder is not bothered with what others want.
             Event::Refused { holder: Some(_), .. } if subject.takeover == Takeover::Exclusive => return None,
             Event::Refused { who, holder: Some(holder), reason: "holder_must_release" } => {
-                (Kind::Refused, who, format!("{who} asks {holder} for control"))
+                (Kind::Refused, who, format!("{} asks {} for control", name(who), name(holder)))
             }
             Event::Refused { who, holder: Some(holder), .. } => {
-                (Kind::Refused, who, format!("{who} refused, {holder} in control"))
+                (Kind::Refused, who, format!("{} refused, {} in control", name(who), name(holder)))
             }
             _ => return None,
         };
@@ -243,7 +245,7 @@ mod tests {
     }
 
     fn subject(manager: u8, takeover: Takeover) -> Subject<'static> {
-        Subject { manager, name: "camera", takeover }
+        Subject { manager, name: "camera", names: Names::default(), takeover }
     }
 
     fn refused(who: MavId) -> Event {

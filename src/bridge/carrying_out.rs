@@ -8,6 +8,7 @@ use crate::channel::ChannelSet;
 use crate::gimbals::DriverOutput;
 use crate::gimbals::report::Report;
 use crate::manager::ManagerOutput;
+use crate::manager::asked::NotDone;
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 use crate::wire::dialect::MavMessage;
@@ -19,6 +20,7 @@ impl Bridge {
             return;
         }
         self.carry_out_for_gimbals(now);
+        self.answer_for_lost_gimbals(now);
         self.carry_out_own_commands(now);
     }
 
@@ -45,7 +47,8 @@ impl Bridge {
                         self.roster.get_mut(at).manager.handle_report(now, report, around);
                     }
                     GimbalOutput::Driver(DriverOutput::Operated { id, result }) => {
-                        self.outbox.push_operated(id, result)
+                        let answer = result.map_err(NotDone::Operation);
+                        self.conclude(now, id, answer);
                     }
                     GimbalOutput::Manager(output) => self.carry_out_for_manager(now, at, component, output),
                 }
@@ -75,6 +78,9 @@ impl Bridge {
                 self.answer(now, channels.unwrap_or(self.channels.open_set()), component, &message);
             }
             ManagerOutput::Steer(setpoint) => self.roster.get_mut(at).driver.handle_setpoint(now, setpoint),
+            ManagerOutput::Operate { id, operation } => {
+                self.roster.get_mut(at).driver.handle_operation(now, id, operation)
+            }
             ManagerOutput::Event(event) => self.handle_event(now, at, event),
         }
     }

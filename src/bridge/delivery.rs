@@ -58,8 +58,11 @@ impl Bridge {
             }
             _ => {}
         }
-        for gimbal in self.roster.iter_mut() {
-            gimbal.manager.handle_heard(now, source);
+        // Under our own ids stands who asks over HTTP, whom nobody else keeps in control.
+        if !ours {
+            for gimbal in self.roster.iter_mut() {
+                gimbal.manager.handle_heard(now, source);
+            }
         }
         if self.autopilot == Some(source) {
             self.handle_autopilot(now, link, role, frame);

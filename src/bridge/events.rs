@@ -10,9 +10,10 @@ use super::roster::Gimbal;
 use super::settings::Role;
 use super::snapshot::EventSnapshot;
 use crate::manager::control::Place;
-use crate::manager::events::Event;
+use crate::manager::events::{Event, Names};
 use crate::manager::messages;
 use crate::timestamp::Timestamp;
+use crate::wire::MavId;
 
 /// So many events are remembered …
 const REMEMBERED: usize = 64;
@@ -37,6 +38,7 @@ pub struct Events {
 struct Entry {
     id: u64,
     gimbal: String,
+    names: Names,
     event: Event,
     first: Timestamp,
     latest: Timestamp,
@@ -51,7 +53,7 @@ impl Default for Events {
 
 impl Events {
     /// Something happened around `gimbal`. The same request refused again and again is one event with a count.
-    pub fn note(&mut self, now: Timestamp, gimbal: &str, event: Event) {
+    pub fn note(&mut self, now: Timestamp, gimbal: &str, names: Names, event: Event) {
         if matches!(event, Event::Refused { .. }) {
             let again = self.entries.iter().position(|entry| entry.is_repeated_by(gimbal, &event));
             if let Some(mut entry) = again.and_then(|at| self.entries.remove(at)) {
@@ -64,7 +66,8 @@ impl Events {
             }
         }
         self.make_room(&event);
-        let entry = Entry { id: self.next_id, gimbal: gimbal.to_owned(), event, first: now, latest: now, count: 1 };
+        let entry =
+            Entry { id: self.next_id, gimbal: gimbal.to_owned(), names, event, first: now, latest: now, count: 1 };
         entry.log(self.journal.take(now, 0));
         self.next_id += 1;
         self.entries.push_back(entry);
@@ -89,11 +92,17 @@ impl Events {
 }
 
 impl Bridge {
+    /// What components are called where it is about the gimbal of that manager.
+    pub(super) fn names(&self, component: u8) -> Names {
+        Names { own: self.identity.system().map(|system| MavId::new(system, component)) }
+    }
+
     /// An event is remembered, and said where the pilot must know it.
     pub(super) fn handle_event(&mut self, now: Timestamp, at: usize, event: Event) {
-        let gimbal = self.roster.get_mut(at);
-        let (component, subject) = (gimbal.component, subject(gimbal));
-        self.events.note(now, subject.name, event);
+        let component = self.roster.get_mut(at).component;
+        let names = self.names(component);
+        let subject = subject(self.roster.get_mut(at), names);
+        self.events.note(now, subject.name, names, event);
         let announcement = self.announcements.handle_event(now, subject, &event);
         self.announce(now, component, announcement);
         self.announce_state(now, at);
@@ -101,8 +110,10 @@ impl Bridge {
 
     /// Says that a gimbal is lost or back, if it is and there is room for it.
     pub(super) fn announce_state(&mut self, now: Timestamp, at: usize) {
+        let component = self.roster.get_mut(at).component;
+        let names = self.names(component);
         let gimbal = self.roster.get_mut(at);
-        let (component, state, subject) = (gimbal.component, gimbal.manager.state(), subject(gimbal));
+        let (state, subject) = (gimbal.manager.state(), subject(gimbal, names));
         let announcement = self.announcements.handle_state(now, subject, state);
         self.announce(now, component, announcement);
     }
@@ -116,9 +127,9 @@ impl Bridge {
 }
 
 /// The gimbal as texts about it name it.
-fn subject(gimbal: &Gimbal) -> Subject<'_> {
+fn subject(gimbal: &Gimbal, names: Names) -> Subject<'_> {
     let settings = gimbal.manager.settings();
-    Subject { manager: gimbal.component, name: &settings.name, takeover: settings.takeover }
+    Subject { manager: gimbal.component, name: &settings.name, names, takeover: settings.takeover }
 }
 
 impl Entry {
@@ -133,11 +144,11 @@ impl Entry {
     /// INFO for an operator's journal, as long as there is room (`told`); DEBUG for refusals, which come by the stream: the
     /// first, the second, the fourth …
     fn log(&self, told: bool) {
-        let Self { gimbal, event, count, .. } = self;
+        let Self { gimbal, names, event, count, .. } = self;
         if matches!(event, Event::Refused { .. }) && !count.is_power_of_two() {
             return;
         }
-        let (what, text) = (event.name(), event.describe());
+        let (what, text) = (event.name(), event.describe(*names));
         match event {
             Event::Refused { .. } => tracing::debug!(gimbal, what, text, count, "event"),
             Event::Lost { .. } | Event::AcquireWar { .. } if told => tracing::warn!(gimbal, what, text, "event"),
@@ -160,11 +171,11 @@ impl Entry {
             gimbal: self.gimbal.clone(),
             what: self.event.name().to_owned(),
             place: place.map(str::to_owned),
-            who: self.event.who().map(|id| id.to_string()),
-            from: self.event.from().map(|id| id.to_string()),
-            to: self.event.to().map(|id| id.to_string()),
+            who: self.event.who().map(|id| self.names.of(id)),
+            from: self.event.from().map(|id| self.names.of(id)),
+            to: self.event.to().map(|id| self.names.of(id)),
             reason: self.event.reason().map(str::to_owned),
-            text: self.event.describe(),
+            text: self.event.describe(self.names),
         }
     }
 }

@@ -4,7 +4,8 @@ use std::collections::VecDeque;
 
 use super::Output;
 use crate::channel::ChannelSet;
-use crate::gimbals::operation::{OperationId, OperationResult};
+use crate::gimbals::operation::OperationId;
+use crate::manager::asked::Answer;
 
 /// Frames that wait for [`poll_output`](super::Bridge::poll_output), their bytes side by side in one buffer.
 #[derive(Debug)]
@@ -12,19 +13,19 @@ pub struct Outbox {
     bytes: Vec<u8>,
     entries: VecDeque<Entry>,
     /// The last one that was given out.
-    result: OperationResult,
+    answer: Answer,
 }
 
 #[derive(Clone, Debug)]
 enum Entry {
     Frame { channels: ChannelSet, start: usize, end: usize },
     StoreSystemId(u8),
-    Operated { id: OperationId, result: OperationResult },
+    Answered { id: OperationId, answer: Answer },
 }
 
 impl Default for Outbox {
     fn default() -> Self {
-        Self { bytes: Vec::new(), entries: VecDeque::new(), result: Ok(()) }
+        Self { bytes: Vec::new(), entries: VecDeque::new(), answer: Ok(()) }
     }
 }
 
@@ -45,17 +46,17 @@ impl Outbox {
         self.entries.push_back(Entry::StoreSystemId(system));
     }
 
-    pub fn push_operated(&mut self, id: OperationId, result: OperationResult) {
-        self.entries.push_back(Entry::Operated { id, result });
+    pub fn push_answer(&mut self, id: OperationId, answer: Answer) {
+        self.entries.push_back(Entry::Answered { id, answer });
     }
 
     pub fn pop(&mut self) -> Option<Output<'_>> {
         Some(match self.entries.pop_front()? {
             Entry::Frame { channels, start, end } => Output::Transmit { channels, bytes: &self.bytes[start..end] },
             Entry::StoreSystemId(system) => Output::StoreSystemId(system),
-            Entry::Operated { id, result } => {
-                self.result = result;
-                Output::Operated { id, result: &self.result }
+            Entry::Answered { id, answer } => {
+                self.answer = answer;
+                Output::Answered { id, answer: &self.answer }
             }
         })
     }

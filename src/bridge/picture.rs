@@ -14,6 +14,7 @@ use crate::channel::ChannelId;
 use crate::geometry::{AngularRate, YawFrame};
 use crate::gimbals::setpoint::Setpoint;
 use crate::manager::control::Place;
+use crate::manager::events::Names;
 use crate::manager::tracking::Tracking;
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
@@ -31,7 +32,7 @@ impl Bridge {
             gimbals: self
                 .roster
                 .iter()
-                .filter(|gimbal| gimbal.configured || gimbal.manager.device().is_some())
+                .filter(|gimbal| gimbal.is_shown())
                 .map(|gimbal| self.gimbal_snapshot(now, gimbal))
                 .collect(),
             events: self.events.snapshot(now, self.started),
@@ -109,6 +110,7 @@ impl Bridge {
 
     fn gimbal_snapshot(&self, now: Timestamp, gimbal: &Gimbal) -> GimbalSnapshot {
         let manager = &gimbal.manager;
+        let names = self.names(gimbal.component);
         let identity = manager.identity();
         let text = |text: &String| Some(text.clone()).filter(|text| !text.is_empty());
         let held_for = |place| manager.control().holder(place).map(|holder| millis(now.since(holder.since)));
@@ -128,12 +130,12 @@ impl Bridge {
                 development => format!("{major}.{minor}.{patch}-{development}"),
             }),
             attitude: self.attitude_snapshot(now, gimbal),
-            setpoint: setpoint_snapshot(manager.tracking()),
-            primary: manager.control().primary().map(|id| id.to_string()),
-            secondary: manager.control().secondary().map(|id| id.to_string()),
+            setpoint: setpoint_snapshot(manager.tracking(), names),
+            primary: manager.control().primary().map(|id| names.of(id)),
+            secondary: manager.control().secondary().map(|id| names.of(id)),
             primary_age_ms: held_for(Place::Primary),
             secondary_age_ms: held_for(Place::Secondary),
-            lender: manager.control().lender().map(|id| id.to_string()),
+            lender: manager.control().lender().map(|id| names.of(id)),
             takeover: manager.settings().takeover.name().to_owned(),
             roi: manager.tracking().roi().map(|place| RoiSnapshot {
                 latitude_deg: place.latitude_deg,
@@ -148,7 +150,7 @@ impl Bridge {
                 .iter()
                 .map(|(sender, reasons)| {
                     let reasons = reasons.iter().map(|(reason, count)| ((*reason).to_owned(), *count)).collect();
-                    (sender.to_string(), reasons)
+                    (names.of(*sender), reasons)
                 })
                 .collect(),
         }
@@ -174,9 +176,9 @@ impl Bridge {
     }
 }
 
-fn setpoint_snapshot(tracking: &Tracking) -> Option<SetpointSnapshot> {
+fn setpoint_snapshot(tracking: &Tracking, names: Names) -> Option<SetpointSnapshot> {
     let mode = tracking.mode()?.to_owned();
-    let source = tracking.source().map(|source| source.to_string());
+    let source = tracking.source().map(|source| names.of(source));
     let (pitch, yaw) = tracking.nudged();
     let bare = SetpointSnapshot {
         mode,

@@ -94,6 +94,11 @@ impl Gimbal {
         }
     }
 
+    /// Whether it is told of: a place that waits for a gimbal is not, unless the configuration names it.
+    pub fn is_shown(&self) -> bool {
+        self.configured || self.manager.device().is_some()
+    }
+
     /// Whether its manager sends heartbeats: 191 always does, others from when their gimbal is known.
     pub fn beats(&self) -> bool {
         self.component == component::ONBOARD_COMPUTER || self.manager.device().is_some()

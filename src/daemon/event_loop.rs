@@ -10,6 +10,7 @@ use std::task::{Context, Poll};
 
 use tokio::sync::{mpsc, watch};
 
+use super::askers::Askers;
 use super::channels::ChannelTable;
 use super::clock::{Clock, DeadlineTimer};
 use super::shutdown::Shutdown;
@@ -21,6 +22,9 @@ use crate::bridge::{Bridge, Input, LinkIndex, Output};
 use crate::links::inbox::{Event, Inbox, PeerIndex};
 use crate::links::{Link, Progress};
 use crate::timestamp::Timestamp;
+
+/// Requests of the window that may wait; whoever asks for more waits.
+pub const REQUESTS: usize = 16;
 
 pub struct EventLoop {
     clock: Clock,
@@ -46,6 +50,7 @@ struct Ports {
     channels: ChannelTable,
     states: Vec<LinkState>,
     system_id_file: SystemIdFile,
+    askers: Askers,
 }
 
 /// What is known of a link, so that only changes are told.
@@ -78,7 +83,7 @@ impl EventLoop {
         let channels = ChannelTable::new(links.len());
         let states =
             names.into_iter().map(|name| LinkState { name, state: State::Unknown, refusal_told: false }).collect();
-        let ports = Ports { links, channels, states, system_id_file };
+        let ports = Ports { links, channels, states, system_id_file, askers: Askers::default() };
         let inbox = Inbox::default();
         Self { clock, timer, core, ports, inbox, shutdown, service_manager, window, started: false }
     }
@@ -140,14 +145,23 @@ impl EventLoop {
         }
     }
 
+    /// Serves what the window asks for, but not more at once than can wait: links come first.
     fn poll_window(&mut self, now: Timestamp, cx: &mut Context<'_>) {
-        while let Poll::Ready(Some(request)) = self.window.requests.poll_recv(cx) {
-            match request {
-                CoreRequest::Refresh => {
+        for _ in 0..REQUESTS {
+            match self.window.requests.poll_recv(cx) {
+                Poll::Ready(Some(CoreRequest::Refresh)) => {
                     self.window.snapshots.send_replace(Arc::new(self.core.snapshot(now)));
                 }
+                Poll::Ready(Some(CoreRequest::Ask { gimbal, asked, answer })) => {
+                    let id = self.ports.askers.wait(answer);
+                    self.input(now, Input::Asked { id, gimbal: &gimbal, asked: &asked });
+                }
+                // Without a window nobody asks.
+                Poll::Ready(None) | Poll::Pending => return,
             }
         }
+        // There may be more.
+        cx.waker().wake_by_ref();
     }
 
     fn serve_service_manager(&mut self, now: Timestamp) {
@@ -184,7 +198,7 @@ impl Ports {
                     }
                 }
                 Output::StoreSystemId(id) => self.system_id_file.store(id),
-                Output::Operated { .. } => {}
+                Output::Answered { id, answer } => self.askers.answer(id, answer.clone()),
             }
         }
     }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use tokio::sync::{mpsc, watch};
 
 use super::clock::{Clock, DeadlineTimer};
-use super::event_loop::{EventLoop, Window};
+use super::event_loop::{EventLoop, REQUESTS, Window};
 use super::shutdown::Shutdown;
 use super::system_id_file::SystemIdFile;
 use super::systemd::ServiceManager;
@@ -15,9 +15,6 @@ use super::window::CoreHandle;
 use crate::bridge::Bridge;
 use crate::config::settings::DaemonSettings;
 use crate::{http, links};
-
-/// Requests that may wait; whoever asks for more waits.
-const REQUESTS: usize = 16;
 
 /// Why the daemon could not start, or not go on.
 #[derive(Debug, thiserror::Error)]

@@ -55,6 +55,45 @@ pub enum Operation {
 }
 
 impl Operation {
+    /// A word for counters and the person looking.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Motors(Motors::Off) => "motors_off",
+            Self::Motors(Motors::On) => "motors_on",
+            Self::Restart(Restart::Reboot) => "reboot",
+            Self::Restart(Restart::Shutdown) => "shutdown",
+            Self::SetYawMode(YawMode::Follow) => "yaw_mode_follow",
+            Self::SetYawMode(YawMode::Lock) => "yaw_mode_lock",
+            Self::Mapping => "mapping",
+            Self::Reset(_) => "reset",
+            Self::RadioControl => "radio_control",
+            Self::RequestInformation => "information",
+            Self::SetStreamRate { .. } => "stream_rate",
+            Self::RefreshParameters => "refresh_parameters",
+            Self::SetParameter { .. } => "set_parameter",
+            Self::SetAxisMotion { .. } => "axis_motion",
+            Self::SetMotorControl(_) => "motor_control",
+            Self::SetLimits { .. } => "limits",
+            Self::SetRadioType(_) => "radio_type",
+            Self::SetEncoderUnit(_) => "encoder_unit",
+            Self::SetCombinedAttitude(_) => "combined_attitude",
+            Self::SetHomeOnModeChange(_) => "home_on_mode_change",
+        }
+    }
+
+    /// Whether it takes the place of where the gimbal was told to look: the setpoint, said again, would undo it.
+    pub const fn ends_demand(&self) -> bool {
+        matches!(
+            self,
+            Self::Motors(Motors::Off)
+                | Self::Restart(_)
+                | Self::SetYawMode(_)
+                | Self::Mapping
+                | Self::Reset(_)
+                | Self::RadioControl
+        )
+    }
+
     /// Whether only who may steer the gimbal may do it: all that can move the camera, now or by a setting.
     pub const fn needs_control(&self) -> bool {
         !matches!(self, Self::RequestInformation | Self::SetStreamRate { .. } | Self::RefreshParameters)

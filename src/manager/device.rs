@@ -18,6 +18,9 @@ impl GimbalManager {
         if !matches!(report, Report::Attitude(_) | Report::Malformed { .. }) {
             self.last_command = None;
         }
+        if matches!(report, Report::Restarted | Report::Lost) {
+            self.paused_by = None;
+        }
         match report {
             Report::Restarted => {
                 // Its clock may have jumped while it goes on turning.

@@ -34,6 +34,11 @@ pub enum Event {
     Restarted {
         device: Option<MavId>,
     },
+    /// Something else than where it looks was asked of the gimbal, and given on to it.
+    Operated {
+        who: MavId,
+        operation: &'static str,
+    },
     /// A rotation was stopped because nobody asked for it any more.
     RatesEnded {
         who: MavId,
@@ -78,6 +83,7 @@ impl Event {
             Self::Back { .. } => "gimbal_back",
             Self::Lost { .. } => "gimbal_lost",
             Self::Restarted { .. } => "gimbal_restarted",
+            Self::Operated { .. } => "operated",
             Self::RatesEnded { .. } => "rates_ended",
             Self::RoiStarted { .. } => "roi_started",
             Self::RoiEnded { .. } => "roi_ended",
@@ -87,7 +93,10 @@ impl Event {
     /// Who did it, or to whom it happened.
     pub const fn who(&self) -> Option<MavId> {
         match *self {
-            Self::Control(Change { who, .. }) | Self::Refused { who, .. } | Self::RatesEnded { who, .. } => Some(who),
+            Self::Control(Change { who, .. })
+            | Self::Refused { who, .. }
+            | Self::Operated { who, .. }
+            | Self::RatesEnded { who, .. } => Some(who),
             Self::AcquireWar { holder, .. } => Some(holder),
             Self::Found { device } | Self::Back { device } => Some(device),
             Self::Lost { device } | Self::Restarted { device } => device,
@@ -125,41 +134,67 @@ impl Event {
     pub const fn reason(&self) -> Option<&'static str> {
         match *self {
             Self::Refused { reason, .. } => Some(reason),
+            Self::Operated { operation, .. } => Some(operation),
             Self::RatesEnded { end: RatesEnd::TimedOut, .. } => Some("timed_out"),
             Self::RatesEnded { end: RatesEnd::SenderSilent, .. } => Some("sender_silent"),
             _ => None,
         }
     }
 
-    /// A sentence for the person looking.
-    pub fn describe(&self) -> String {
+    /// A sentence for the person looking, with components as `names` has them.
+    pub fn describe(&self, names: Names) -> String {
+        let by = |what: &str, who: Option<MavId>| {
+            who.map_or_else(|| what.to_owned(), |who| format!("{what}, by {}", names.of(who)))
+        };
         match *self {
-            Self::Control(change) => describe_change(change),
+            Self::Control(change) => describe_change(change, names),
             Self::Refused { who, reason, holder } => {
-                let reason = explain(reason);
-                match holder {
-                    Some(holder) if reason.is_empty() => format!("{who} was refused: {holder} is in control"),
-                    Some(holder) => format!("{who} was refused: {holder} is in control, and {reason}"),
-                    None => format!("{who} was refused: {reason}"),
-                }
+                format!("{} was refused: {}", names.of(who), why(reason, holder, names))
             }
             Self::AcquireWar { holder, other } => {
-                let others = other.map_or_else(|| "another".to_owned(), |other| other.to_string());
+                let others = other.map_or_else(|| "another".to_owned(), |other| names.of(other));
+                let holder = names.of(holder);
                 format!("{holder} and {others} keep taking control from each other; {holder} keeps it for a while")
             }
             Self::Found { device } => format!("gimbal found as {device}"),
             Self::Back { device } => format!("gimbal {device} is back"),
             Self::Lost { .. } => "gimbal lost".to_owned(),
             Self::Restarted { .. } => "gimbal restarted; it holds still until somebody asks".to_owned(),
+            Self::Operated { who, operation } => format!("{} asked for {}", names.of(who), operation.replace('_', " ")),
             Self::RatesEnded { who, end: RatesEnd::TimedOut } => {
-                format!("rotation stopped: {who} did not ask for it again")
+                format!("rotation stopped: {} did not ask for it again", names.of(who))
             }
             Self::RatesEnded { who, end: RatesEnd::SenderSilent } => {
-                format!("rotation stopped: {who}, who asked for it, is silent")
+                format!("rotation stopped: {}, who asked for it, is silent", names.of(who))
             }
             Self::RoiStarted { who } => by("points at a place", who),
             Self::RoiEnded { who } => by("points at no place any more", who),
         }
+    }
+}
+
+/// Why somebody was refused; `holder` is who stands in the way.
+pub fn why(reason: &str, holder: Option<MavId>, names: Names) -> String {
+    let reason = explain(reason);
+    match holder.map(|holder| names.of(holder)) {
+        Some(holder) if reason.is_empty() => format!("{holder} is in control"),
+        Some(holder) => format!("{holder} is in control, and {reason}"),
+        None => reason,
+    }
+}
+
+/// What components are called where people read it.
+///
+/// Programs that ask over HTTP have the manager's own ids (D5), and are called `http`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Names {
+    /// The manager's own ids, once its system id is settled.
+    pub own: Option<MavId>,
+}
+
+impl Names {
+    pub fn of(self, id: MavId) -> String {
+        if self.own == Some(id) { "http".to_owned() } else { id.to_string() }
     }
 }
 
@@ -174,6 +209,7 @@ fn explain(reason: &str) -> String {
         "nobody_in_control" => "nobody is in control, and unclaimed = \"closed\" lets nobody steer before",
         "acquire_war" => "control changed hands too often lately",
         "other_vehicle" => "it belongs to another vehicle",
+        "only_for_the_holder" => "only who has control may ask for that",
         "half_a_pair" => "it named half of a system and component id",
         "not_an_id" => "it named something that is no id",
         "unknown_gimbal" => "it named a gimbal that is not here",
@@ -185,21 +221,17 @@ fn explain(reason: &str) -> String {
     .to_owned()
 }
 
-fn by(what: &str, who: Option<MavId>) -> String {
-    who.map_or_else(|| what.to_owned(), |who| format!("{what}, by {who}"))
-}
-
-fn describe_change(change: Change) -> String {
+fn describe_change(change: Change, names: Names) -> String {
     let Change { place, how, who, from, to } = change;
     let control = match place {
         Place::Primary => "control",
         Place::Secondary => "secondary control",
     };
-    let name = |id: Option<MavId>| id.map_or_else(|| "nobody".to_owned(), |id| id.to_string());
-    let (from, to) = (name(from), name(to));
+    let name = |id: Option<MavId>| id.map_or_else(|| "nobody".to_owned(), |id| names.of(id));
+    let (who, from, to) = (names.of(who), name(from), name(to));
     match how {
         How::Taken => format!("{who} took {control}"),
-        How::TakenOver if to == who.to_string() => format!("{who} took {control} from {from}"),
+        How::TakenOver if to == who => format!("{who} took {control} from {from}"),
         How::TakenOver => format!("{who} took {control} from {from} for {to}"),
         How::Borrowed => format!("the autopilot borrowed {control} from {from}"),
         How::Restored => format!("{to} has {control} back from the autopilot"),
@@ -237,8 +269,13 @@ mod tests {
                 Event::Refused { who: script, reason: "unknown_gimbal", holder: None },
                 "245/191 was refused: it named a gimbal that is not here",
             ),
+            (Event::Operated { who: MavId::new(1, 191), operation: "motors_off" }, "http asked for motors off"),
+            (
+                Event::Refused { who: MavId::new(1, 191), reason: "not_in_control", holder: Some(gcs) },
+                "http was refused: 255/190 is in control",
+            ),
         ] {
-            assert_eq!(event.describe(), text);
+            assert_eq!(event.describe(Names { own: Some(MavId::new(1, 191)) }), text);
         }
     }
 }

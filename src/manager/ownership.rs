@@ -53,6 +53,7 @@ impl GimbalManager {
     /// `sender` was obeyed.
     pub(super) fn note_demand(&mut self, now: Timestamp, sender: MavId) {
         self.source_heard = now;
+        self.paused_by = None;
         if self.control.primary() == Some(sender) {
             self.primary_demand = Some(now);
         }
@@ -68,7 +69,16 @@ impl GimbalManager {
         if around.other_vehicle {
             return Err(Refusal::denied("other_vehicle"));
         }
-        let configure = Configure::read(command)?;
+        self.configure(now, sender, Configure::read(command)?, around)
+    }
+
+    pub(super) fn configure(
+        &mut self,
+        now: Timestamp,
+        sender: MavId,
+        configure: Configure,
+        around: Surroundings<'_>,
+    ) -> Result<(), Refusal> {
         let policy = self.policy(around);
         let (before, was_truce) = (self.control.primary(), self.control.is_truce(now));
         let changes = self.control.configure(now, sender, configure, policy)?;

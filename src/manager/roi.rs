@@ -19,7 +19,7 @@ const FURTHEST_ALTITUDE: f64 = 100_000.0;
 
 /// What the altitude of a place counts from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Datum {
+pub enum Datum {
     MeanSeaLevel,
     Home,
 }
@@ -94,6 +94,20 @@ impl GimbalManager {
         if (latitude_deg, longitude_deg, altitude) == (0.0, 0.0, 0.0) {
             return self.do_set_roi_none(now, sender);
         }
+        self.look_at_place(now, sender, [latitude_deg, longitude_deg], altitude, datum, around)
+    }
+
+    /// Looks at a place; degrees, and metres above `datum`.
+    pub(super) fn look_at_place(
+        &mut self,
+        now: Timestamp,
+        sender: MavId,
+        [latitude_deg, longitude_deg]: [f64; 2],
+        altitude: f64,
+        datum: Datum,
+        around: Surroundings<'_>,
+    ) -> Result<(), Refusal> {
+        let no_such_place = Refusal::denied("no_such_place");
         if latitude_deg.abs() > 90.0 || longitude_deg.abs() > 180.0 || altitude.abs() > FURTHEST_ALTITUDE {
             return Err(no_such_place);
         }

@@ -124,6 +124,45 @@ impl Tracking {
         Ok(())
     }
 
+    /// Keeps the direction that the gimbal was told, or else has, yaw in `frame`.
+    pub fn hold(
+        &mut self,
+        now: Timestamp,
+        source: MavId,
+        frame: YawFrame,
+        situation: &Situation<'_>,
+    ) -> Result<(), Refusal> {
+        self.carry_on(now, situation);
+        self.need_frame(frame, situation)?;
+        let kept = self.reference(frame, situation).ok_or(Refusal::later("no_attitude"))?;
+        let pose = Pose { roll: kept.roll.at, pitch: kept.pitch.at, yaw: kept.yaw.at };
+        let aim = Aim::Point(Point::still(pose, frame, kept.stabilised));
+        self.change_hands(now, &aim, situation)?;
+        self.begin(now, source, aim);
+        Ok(())
+    }
+
+    /// Stays where it looks at this moment, on its way or not; the yaw in `frame`, if that is possible.
+    pub fn stay(
+        &mut self,
+        now: Timestamp,
+        source: MavId,
+        frame: YawFrame,
+        situation: &Situation<'_>,
+    ) -> Result<(), Refusal> {
+        self.carry_on(now, situation);
+        self.nudge.stop();
+        // To stop takes no heading.
+        let frame = if self.need_frame(frame, situation).is_ok() { frame } else { situation.device_frame(frame) };
+        let Some(pose) = self.unnudged_pose(frame, situation) else {
+            return self.hold(now, source, frame, situation);
+        };
+        let aim = Aim::Point(Point::still(pose, frame, Stabilised::BOTH));
+        self.change_hands(now, &aim, situation)?;
+        self.begin(now, source, aim);
+        Ok(())
+    }
+
     /// Ends pointing at a place: neutral where the gimbal knows such, straight ahead otherwise. True if there was one.
     pub fn end_roi(&mut self, now: Timestamp, source: MavId, capabilities: &Capabilities) -> bool {
         let was_active = matches!(self.aim, Aim::Roi(_));

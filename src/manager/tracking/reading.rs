@@ -185,7 +185,7 @@ impl Tracking {
     }
 
     /// Where the gimbal would look now if nobody nudged it, yaw in `frame`.
-    fn unnudged_pose(&self, frame: YawFrame, situation: &Situation<'_>) -> Option<Pose> {
+    pub(super) fn unnudged_pose(&self, frame: YawFrame, situation: &Situation<'_>) -> Option<Pose> {
         situation.measured_pose(frame).map(|pose| self.nudge.taken_off(pose))
     }
 }

@@ -2,6 +2,7 @@
 
 mod angles;
 mod answers;
+mod asked;
 mod bad_days;
 mod client_control;
 mod commands;

@@ -9,7 +9,8 @@ use gimbald::bridge::settings::{LinkSettings, Role, Settings, SystemId, Transpor
 use gimbald::bridge::snapshot::Snapshot;
 use gimbald::bridge::{Bridge, ChannelId, Input, Output};
 use gimbald::gimbals::mavlink_v2::sim::{Device, DeviceSettings};
-use gimbald::gimbals::operation::{OperationId, OperationResult};
+use gimbald::gimbals::operation::OperationId;
+use gimbald::manager::asked::Answer;
 use gimbald::sim::peer::{Peer, PlatformMotion};
 use gimbald::sim::vehicle::{Vehicle, VehicleSettings};
 use gimbald::timestamp::Timestamp;
@@ -71,8 +72,8 @@ pub struct World {
     is_running: bool,
     ends: Vec<End>,
     pub stored_system_ids: Vec<u8>,
-    /// What became of operations.
-    pub operated: Vec<(OperationId, OperationResult)>,
+    /// What became of what was asked of gimbals by name.
+    pub answers: Vec<(OperationId, Answer)>,
 }
 
 impl World {
@@ -87,7 +88,7 @@ impl World {
             is_running: true,
             ends: Vec::new(),
             stored_system_ids: Vec::new(),
-            operated: Vec::new(),
+            answers: Vec::new(),
         };
         let mut places = Vec::new();
         for link in 0..links {
@@ -295,8 +296,8 @@ impl World {
                     self.stored_system_ids.push(system);
                     continue;
                 }
-                Output::Operated { id, result } => {
-                    self.operated.push((id, result.clone()));
+                Output::Answered { id, answer } => {
+                    self.answers.push((id, answer.clone()));
                     continue;
                 }
             };

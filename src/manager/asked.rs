@@ -1,0 +1,296 @@
+//! What is asked of a gimbal by its name, from outside MAVLink: over HTTP, with the token.
+//!
+//! "One gate for v2 messages, v2 commands, v1 commands, ROI, RC and HTTP … In 281, HTTP and RC appear as the manager's own
+//! ids" (D5). Whoever asks this way is one party, which takes, holds, lends and loses control as a component does; it is
+//! heard whenever it asks for something.
+
+use super::control::Voice;
+use super::events::Event;
+use super::request::{AxisDemand, Claim, Configure, Demand, DemandKind, Refusal};
+use super::roi::Datum;
+use super::{DeviceState, GimbalManager, ManagerOutput, Surroundings, control};
+use crate::geometry::{AngularRate, YawFrame};
+use crate::gimbals::operation::{Motors, Operation, OperationError, OperationId, Restart};
+use crate::timestamp::Timestamp;
+use crate::wire::MavId;
+use crate::wire::ids::{CommandResult, GimbalFlags};
+
+/// Something asked of a gimbal.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Asked {
+    /// Primary control; asked again by its holder it keeps it.
+    TakeControl,
+    /// Every place that it has is given up.
+    ReleaseControl,
+    /// Angles to take and keep; an axis that is left out stays as it is.
+    Point {
+        roll: AxisDemand,
+        pitch: AxisDemand,
+        yaw: AxisDemand,
+        yaw_frame: YawFrame,
+    },
+    /// To turn until it is not asked for again.
+    Turn {
+        roll: Option<AngularRate>,
+        pitch: AngularRate,
+        yaw: AngularRate,
+        yaw_frame: YawFrame,
+    },
+    /// Stays where it looks at this moment.
+    Stop,
+    /// Keeps its direction, yaw to North however the vehicle turns …
+    Lock,
+    /// … or to the nose of the vehicle.
+    Follow,
+    Neutral,
+    Retract,
+    LookAt {
+        latitude_deg: f64,
+        longitude_deg: f64,
+        altitude_m: f64,
+        datum: Datum,
+    },
+    /// Looks at no place any more.
+    EndRoi,
+    Operation(Operation),
+}
+
+/// Why something was not done.
+#[derive(Clone, Debug, PartialEq)]
+pub enum NotDone {
+    /// No gimbal has that name.
+    UnknownGimbal,
+    /// `holder` is named where that is why.
+    Refused {
+        refusal: Refusal,
+        holder: Option<MavId>,
+    },
+    Operation(OperationError),
+    /// So much is being done already that no more is begun.
+    TooMuch,
+    /// The system id is not settled yet.
+    Starting,
+    /// The process is to end.
+    Ending,
+}
+
+/// What became of something asked.
+pub type Answer = Result<(), NotDone>;
+
+/// Whether it is done, or its answer comes later.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress {
+    Done,
+    UnderWay,
+}
+
+impl Asked {
+    /// Whether only the holder of primary control may ask for it, also where nobody has control and everybody may steer:
+    /// it can cost the camera or the flight.
+    pub const fn is_dangerous(&self) -> bool {
+        matches!(
+            self,
+            Self::Operation(Operation::Motors(Motors::Off) | Operation::Restart(Restart::Reboot | Restart::Shutdown))
+        )
+    }
+}
+
+impl GimbalManager {
+    /// What `who`, the manager's own ids, asks for in the name of those outside.
+    pub fn handle_asked(
+        &mut self,
+        now: Timestamp,
+        who: MavId,
+        id: OperationId,
+        asked: &Asked,
+        around: Surroundings<'_>,
+    ) -> Result<Progress, NotDone> {
+        self.end_leases(now);
+        self.handle_heard(now, who);
+        let result = self.do_asked(now, who, id, asked, around);
+        if let Err(NotDone::Refused { refusal, .. }) = &result {
+            self.count_refusal(who, refusal.reason);
+        }
+        self.carry_out(now, around);
+        result
+    }
+
+    fn do_asked(
+        &mut self,
+        now: Timestamp,
+        who: MavId,
+        id: OperationId,
+        asked: &Asked,
+        around: Surroundings<'_>,
+    ) -> Result<Progress, NotDone> {
+        let done = match asked {
+            Asked::TakeControl => {
+                self.configure(now, who, Configure { primary: Claim::Take, secondary: Claim::Keep }, around)
+            }
+            Asked::ReleaseControl => {
+                self.configure(now, who, Configure { primary: Claim::Release, secondary: Claim::Release }, around)
+            }
+            Asked::Operation(operation) => return self.do_operation(now, who, id, asked, operation, around),
+            _ => self.do_asked_aim(now, who, asked, around),
+        };
+        done.map(|()| Progress::Done).map_err(|refusal| self.not_done(refusal))
+    }
+
+    /// All that concerns where the gimbal looks; it passes the gate.
+    fn do_asked_aim(
+        &mut self,
+        now: Timestamp,
+        who: MavId,
+        asked: &Asked,
+        around: Surroundings<'_>,
+    ) -> Result<(), Refusal> {
+        let voice = self.gate(now, who, around)?;
+        let done = match asked {
+            Asked::Point { roll, pitch, yaw, yaw_frame } => {
+                let demand = Demand {
+                    roll: *roll,
+                    pitch: *pitch,
+                    yaw: *yaw,
+                    kind: DemandKind::Commanded,
+                    ..in_frame(*yaw_frame)
+                };
+                self.handle_demand(now, who, &demand, around)
+            }
+            Asked::Turn { roll, pitch, yaw, yaw_frame } => {
+                let rate = |rate| AxisDemand { angle: None, rate };
+                let demand = Demand {
+                    roll: rate(*roll),
+                    pitch: rate(Some(*pitch)),
+                    yaw: rate(Some(*yaw)),
+                    ..in_frame(*yaw_frame)
+                };
+                self.handle_demand(now, who, &demand, around)
+            }
+            Asked::Neutral => {
+                let flags = GimbalFlags::NEUTRAL;
+                self.handle_demand(now, who, &Demand { flags, ..Demand::default() }, around)
+            }
+            Asked::Retract => {
+                let flags = GimbalFlags::RETRACT;
+                self.handle_demand(now, who, &Demand { flags, ..Demand::default() }, around)
+            }
+            Asked::Stop => self.stay(now, who, voice, None, around),
+            Asked::Lock => self.stay(now, who, voice, Some(YawFrame::Earth), around),
+            Asked::Follow => self.stay(now, who, voice, Some(YawFrame::Vehicle), around),
+            Asked::LookAt { latitude_deg, longitude_deg, altitude_m, datum } => {
+                voice.needs_whole()?;
+                self.look_at_place(now, who, [*latitude_deg, *longitude_deg], *altitude_m, *datum, around)
+            }
+            Asked::EndRoi => {
+                voice.needs_whole()?;
+                self.do_set_roi_none(now, who)
+            }
+            Asked::TakeControl | Asked::ReleaseControl | Asked::Operation(_) => Ok(()),
+        };
+        if done.is_ok() {
+            // A command that comes after it is none of the past.
+            self.last_command = None;
+        }
+        done
+    }
+
+    /// Keeps where the gimbal looks, yaw in `frame`, or in the one that it is held in. A rotation is stopped first, as
+    /// fast as the gimbal can.
+    fn stay(
+        &mut self,
+        now: Timestamp,
+        who: MavId,
+        voice: Voice,
+        frame: Option<YawFrame>,
+        around: Surroundings<'_>,
+    ) -> Result<(), Refusal> {
+        voice.needs_whole()?;
+        let held = if self.tracking.is_locked() { YawFrame::Earth } else { YawFrame::Vehicle };
+        if self.tracking.is_rotating() {
+            let zero = AxisDemand { angle: None, rate: Some(AngularRate::ZERO) };
+            let demand = Demand { roll: zero, pitch: zero, yaw: zero, ..in_frame(frame.unwrap_or(held)) };
+            return self.handle_demand(now, who, &demand, around);
+        }
+        let capabilities = *self.steerable()?;
+        let situation = self.situation(now, &capabilities, around);
+        match frame {
+            Some(frame) => self.tracking.hold(now, who, frame, &situation)?,
+            None => self.tracking.stay(now, who, held, &situation)?,
+        }
+        self.note_demand(now, who);
+        Ok(())
+    }
+
+    fn do_operation(
+        &mut self,
+        now: Timestamp,
+        who: MavId,
+        id: OperationId,
+        asked: &Asked,
+        operation: &Operation,
+        around: Surroundings<'_>,
+    ) -> Result<Progress, NotDone> {
+        if operation.needs_control() {
+            let voice = self.gate(now, who, around).and_then(Voice::needs_whole);
+            voice.map_err(|refusal| self.not_done(refusal))?;
+            if asked.is_dangerous() && self.control.primary() != Some(who) {
+                return Err(self.not_done(Refusal::denied("only_for_the_holder")));
+            }
+        }
+        if self.state != DeviceState::Alive {
+            return Err(NotDone::Operation(OperationError::NotThere));
+        }
+        if operation.needs_control() {
+            self.last_command = None;
+            self.note_demand(now, who);
+            self.tell(Event::Operated { who, operation: operation.name() });
+        }
+        if operation.ends_demand() {
+            if self.tracking.stop_rates(now) {
+                self.carry_out(now, around);
+            }
+            self.paused_by = Some(id);
+        }
+        self.outputs.push_back(ManagerOutput::Operate { id, operation: operation.clone() });
+        Ok(Progress::UnderWay)
+    }
+
+    /// What became of an operation. One that was done has taken the place of what the gimbal was told before; after one
+    /// that was not it goes on with that.
+    pub fn handle_operated(&mut self, now: Timestamp, id: OperationId, is_done: bool, around: Surroundings<'_>) {
+        if self.paused_by.take_if(|paused_by| *paused_by == id).is_none() {
+            return;
+        }
+        if is_done {
+            self.tracking.forget();
+        }
+        self.carry_out(now, around);
+    }
+
+    fn not_done(&self, refusal: Refusal) -> NotDone {
+        let holder = self.control.primary().filter(|_| control::STANDS_IN_THE_WAY.contains(&refusal.reason));
+        NotDone::Refused { refusal, holder }
+    }
+}
+
+/// Without a demand on any axis; roll and pitch to the horizon.
+fn in_frame(yaw_frame: YawFrame) -> Demand {
+    let frame = match yaw_frame {
+        YawFrame::Earth => GimbalFlags::YAW_IN_EARTH_FRAME | GimbalFlags::YAW_LOCK,
+        YawFrame::Vehicle => GimbalFlags::YAW_IN_VEHICLE_FRAME,
+    };
+    Demand { flags: GimbalFlags::ROLL_LOCK | GimbalFlags::PITCH_LOCK | frame, ..Demand::default() }
+}
+
+impl NotDone {
+    /// Whether it is not done for the moment only, or would never be.
+    pub fn is_for_the_moment(&self) -> bool {
+        match self {
+            Self::Refused { refusal, .. } => {
+                matches!(refusal.result, CommandResult::TemporarilyRejected | CommandResult::Failed)
+            }
+            Self::TooMuch | Self::Starting | Self::Ending => true,
+            Self::UnknownGimbal | Self::Operation(_) => false,
+        }
+    }
+}
