@@ -4,7 +4,9 @@
 //! drivers, in `gimbals/<family>/sim.rs`. Only `host` and `pty` touch the outside: they run a peer on a real link.
 
 pub mod command;
+pub mod component;
 pub mod faults;
+pub mod heading;
 pub mod host;
 pub mod outbox;
 pub mod parameters;
@@ -13,4 +15,5 @@ pub mod plant;
 pub mod pty;
 pub mod random;
 pub mod streams;
+pub mod system_id;
 pub mod vehicle;

@@ -12,17 +12,13 @@ use std::time::Duration;
 
 pub use flight::{HEIGHT_M, HOME, Motion, RADIUS_M, SPEED_MPS};
 
-use crate::sim::outbox::Outbox;
+use crate::sim::component::{Component, Line};
 use crate::sim::parameters::{ParameterServer, ParameterValue};
-use crate::sim::peer::{Peer, PlatformMotion};
+use crate::sim::peer::PlatformMotion;
 use crate::sim::streams::Streams;
 use crate::timestamp::Timestamp;
-use crate::wire::decoder::Patience;
 use crate::wire::ids::message;
-use crate::wire::{MavId, StreamDecoder};
-
-/// A frame whose rest does not come within this was noise.
-const DECODER_PATIENCE: Duration = Duration::from_millis(100);
+use crate::wire::{Frame, MavId};
 
 /// Which autopilot a simulated vehicle has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,8 +69,7 @@ impl Default for VehicleSettings {
 pub struct Vehicle {
     settings: VehicleSettings,
     boot: Timestamp,
-    outbox: Outbox,
-    decoder: StreamDecoder,
+    line: Line,
     streams: Streams,
     parameters: ParameterServer,
     is_armed: bool,
@@ -89,8 +84,7 @@ impl Vehicle {
         }
         Self {
             boot: now,
-            outbox: Outbox::new(MavId::new(settings.system_id, telemetry::COMPONENT)),
-            decoder: StreamDecoder::new(Patience::Fixed(DECODER_PATIENCE)),
+            line: Line::new(MavId::new(settings.system_id, telemetry::COMPONENT)),
             streams,
             parameters: parameters::parameters(settings.autopilot, settings.system_id),
             is_armed: true,
@@ -105,7 +99,7 @@ impl Vehicle {
     }
 
     pub fn id(&self) -> MavId {
-        self.outbox.source()
+        self.line.id()
     }
 
     /// Where it is and how it moves.
@@ -138,50 +132,38 @@ impl Vehicle {
     fn ignores(&self, id: u32) -> bool {
         id == message::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE && self.settings.state_for_gimbals == StateForGimbals::Ignored
     }
+}
 
-    fn read_frames(&mut self, now: Timestamp) {
-        let mut decoder = std::mem::take(&mut self.decoder);
-        while let Some(frame) = decoder.next_frame() {
-            if frame.target().includes(self.id()) {
-                self.handle_request(now, &frame);
-            }
+impl Component for Vehicle {
+    fn line(&self) -> &Line {
+        &self.line
+    }
+
+    fn line_mut(&mut self) -> &mut Line {
+        &mut self.line
+    }
+
+    /// It is where its clock puts it.
+    fn advance(&mut self, _now: Timestamp) {}
+
+    fn handle_frame(&mut self, now: Timestamp, frame: &Frame<'_>) {
+        if frame.target().includes(self.id()) {
+            self.handle_request(now, frame);
         }
-        self.decoder = decoder;
     }
 
     fn send_due(&mut self, now: Timestamp) {
         while let Some(id) = self.streams.pop_due(now) {
             self.report(now, id);
         }
-        self.parameters.handle_timeout(now, &mut self.outbox);
-    }
-}
-
-impl Peer for Vehicle {
-    fn handle_received(&mut self, now: Timestamp, bytes: &[u8]) {
-        self.decoder.push(now, bytes);
-        self.read_frames(now);
-        self.send_due(now);
+        self.parameters.handle_timeout(now, &mut self.line.outbox);
     }
 
-    fn handle_timeout(&mut self, now: Timestamp) {
-        if self.decoder.poll_timeout().is_some_and(|at| at <= now) {
-            self.decoder.handle_timeout(now);
-            self.read_frames(now);
-        }
-        self.send_due(now);
+    fn next_due(&self) -> Option<Timestamp> {
+        [self.streams.poll_timeout(), self.parameters.poll_timeout()].into_iter().flatten().min()
     }
 
-    fn poll_output(&mut self) -> Option<Vec<u8>> {
-        self.outbox.poll()
-    }
-
-    fn poll_timeout(&self) -> Option<Timestamp> {
-        let timers = [self.streams.poll_timeout(), self.parameters.poll_timeout(), self.decoder.poll_timeout()];
-        timers.into_iter().flatten().min()
-    }
-
-    fn handle_reboot(&mut self, now: Timestamp) {
+    fn restart(&mut self, now: Timestamp) {
         *self = Self::new(now, VehicleSettings { uptime: Duration::ZERO, ..self.settings });
     }
 }

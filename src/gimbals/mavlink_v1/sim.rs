@@ -8,23 +8,22 @@ use std::time::Duration;
 use super::packet::Signs;
 use crate::geometry::{Angle, AxisLimits, Limits};
 use crate::sim::command::Command;
-use crate::sim::outbox::Outbox;
+use crate::sim::component::{Component, Line};
 use crate::sim::parameters::{IntegerEncoding, ParameterServer, ParameterValue};
-use crate::sim::peer::{Peer, PlatformMotion};
+use crate::sim::peer::PlatformMotion;
 use crate::sim::plant::{Drive, Plant, PlantSettings, YawHold};
 use crate::sim::streams::Streams;
+pub use crate::sim::system_id::SystemId;
 use crate::timestamp::Timestamp;
-use crate::wire::decoder::Patience;
 use crate::wire::dialect::{
     ATTITUDE_DATA, HEARTBEAT_DATA, MOUNT_ORIENTATION_DATA, MOUNT_STATUS_DATA, REQUEST_DATA_STREAM_DATA,
 };
 use crate::wire::ids::{
     CommandResult, command, component, mav_autopilot, mav_data_stream, mav_state, mav_type, message, mount_mode,
 };
-use crate::wire::{Frame, MavId, StreamDecoder};
+use crate::wire::{Frame, MavId};
 
 const HEARTBEAT_INTERVAL: Duration = Duration::from_secs(1);
-const DECODER_PATIENCE: Duration = Duration::from_millis(100);
 
 /// The motors take so long to find themselves; until then it is not `MAV_STATE_ACTIVE`.
 const START_UP: Duration = Duration::from_secs(2);
@@ -33,21 +32,13 @@ const START_UP: Duration = Duration::from_secs(2);
 #[derive(Clone, Debug, PartialEq)]
 pub struct DeviceSettings {
     pub component_id: u8,
+    /// Until a vehicle is heard, it is silent.
     pub system_id: SystemId,
     pub signs: Signs,
     pub feedback: Feedback,
     /// Asks the vehicle for `ATTITUDE` ten times a second and `GLOBAL_POSITION_INT` twice, as the contract allows.
     pub asks_for_streams: bool,
     pub plant: PlantSettings,
-}
-
-/// Under which system id the gimbal speaks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SystemId {
-    /// That of the first vehicle it hears; silent until then.
-    Adopt,
-    /// From the start, whoever is there.
-    Fixed(u8),
 }
 
 /// How it says where it looks.
@@ -88,8 +79,7 @@ pub struct Device {
     boot: Timestamp,
     /// The vehicle it belongs to.
     vehicle: Option<MavId>,
-    outbox: Outbox,
-    decoder: StreamDecoder,
+    line: Line,
     streams: Streams,
     parameters: ParameterServer,
     plant: Plant,
@@ -113,8 +103,7 @@ impl Device {
         Self {
             boot: now,
             vehicle: None,
-            outbox: Outbox::new(MavId::new(system, settings.component_id)),
-            decoder: StreamDecoder::new(Patience::Fixed(DECODER_PATIENCE)),
+            line: Line::new(MavId::new(system, settings.component_id)),
             streams: Streams::default(),
             parameters: ParameterServer::new(parameters, IntegerEncoding::Bytewise),
             plant: Plant::new(now, settings.plant.clone()),
@@ -126,7 +115,7 @@ impl Device {
     }
 
     pub fn id(&self) -> MavId {
-        self.outbox.source()
+        self.line.id()
     }
 
     /// The mechanics, to look at.
@@ -149,26 +138,6 @@ impl Device {
         }
     }
 
-    fn handle_frame(&mut self, now: Timestamp, frame: &Frame<'_>) {
-        if let Some(heartbeat) = frame.decode::<HEARTBEAT_DATA>() {
-            self.handle_heartbeat(now, frame.source(), &heartbeat);
-            return;
-        }
-        if self.vehicle == Some(frame.source())
-            && let Some(attitude) = frame.decode::<ATTITUDE_DATA>()
-        {
-            self.ride(now, &attitude);
-        }
-        if !self.is_speaking || !frame.target().includes(self.id()) {
-            return;
-        }
-        if let Some(command) = Command::read(frame) {
-            self.handle_command(now, &command);
-        } else {
-            self.parameters.handle_frame(now, frame, &mut self.outbox);
-        }
-    }
-
     /// "Wait for a HEARTBEAT. Ignore type 6 (GCS) … Remember source sysid/compid. Adopt that sysid."
     fn handle_heartbeat(&mut self, now: Timestamp, source: MavId, heartbeat: &HEARTBEAT_DATA) {
         if self.vehicle.is_some() || mav_type::NOT_A_VEHICLE.contains(&heartbeat.mavtype) {
@@ -176,12 +145,12 @@ impl Device {
         }
         self.vehicle = Some(source);
         if self.settings.system_id == SystemId::Adopt {
-            self.outbox.set_system(source.system);
+            self.line.outbox.set_system(source.system);
         }
         self.start_speaking(now);
         if self.settings.asks_for_streams {
             for (req_stream_id, req_message_rate) in [(mav_data_stream::EXTRA1, 10), (mav_data_stream::POSITION, 2)] {
-                self.outbox.send(&REQUEST_DATA_STREAM_DATA {
+                self.line.outbox.send(&REQUEST_DATA_STREAM_DATA {
                     req_message_rate,
                     target_system: source.system,
                     target_component: source.component,
@@ -211,7 +180,7 @@ impl Device {
             _ => CommandResult::Unsupported,
         };
         if command.is_directed() || result == CommandResult::Accepted {
-            command.acknowledge(&mut self.outbox, result);
+            command.acknowledge(&mut self.line.outbox, result);
         }
     }
 
@@ -273,18 +242,11 @@ impl Device {
         );
     }
 
-    fn send_due(&mut self, now: Timestamp) {
-        while let Some(id) = self.streams.pop_due(now) {
-            self.report(now, id);
-        }
-        self.parameters.handle_timeout(now, &mut self.outbox);
-    }
-
     fn report(&mut self, now: Timestamp, id: u32) {
         let pose = self.plant.measure(now);
         let up = now.since(self.boot);
         match id {
-            message::HEARTBEAT => self.outbox.send(&HEARTBEAT_DATA {
+            message::HEARTBEAT => self.line.outbox.send(&HEARTBEAT_DATA {
                 custom_mode: 0,
                 mavtype: mav_type::GIMBAL,
                 autopilot: mav_autopilot::GENERIC,
@@ -294,7 +256,7 @@ impl Device {
             }),
             message::MOUNT_ORIENTATION => {
                 let heading = self.plant.platform_heading(now);
-                self.outbox.send(&MOUNT_ORIENTATION_DATA {
+                self.line.outbox.send(&MOUNT_ORIENTATION_DATA {
                     time_boot_ms: (Timestamp::ZERO + up).boot_ms(),
                     roll: pose.roll.degrees() as f32,
                     pitch: pose.pitch.degrees() as f32,
@@ -304,7 +266,7 @@ impl Device {
             }
             message::MOUNT_STATUS => {
                 let hundredths = |angle: Angle| (angle.degrees() * 100.0).round() as i32;
-                self.outbox.send(&MOUNT_STATUS_DATA {
+                self.line.outbox.send(&MOUNT_STATUS_DATA {
                     pointing_a: hundredths(pose.pitch),
                     pointing_b: hundredths(pose.roll),
                     pointing_c: hundredths(pose.yaw.wrapped()),
@@ -316,54 +278,64 @@ impl Device {
             _ => {}
         }
     }
-
-    fn read_frames(&mut self, now: Timestamp) {
-        let mut decoder = std::mem::take(&mut self.decoder);
-        while let Some(frame) = decoder.next_frame() {
-            self.handle_frame(now, &frame);
-        }
-        self.decoder = decoder;
-    }
 }
 
-impl Peer for Device {
-    fn handle_received(&mut self, now: Timestamp, bytes: &[u8]) {
-        self.plant.advance(now);
-        self.decoder.push(now, bytes);
-        self.read_frames(now);
-        self.send_due(now);
+impl Component for Device {
+    fn line(&self) -> &Line {
+        &self.line
     }
 
-    fn handle_timeout(&mut self, now: Timestamp) {
+    fn line_mut(&mut self) -> &mut Line {
+        &mut self.line
+    }
+
+    fn advance(&mut self, now: Timestamp) {
         self.plant.advance(now);
         if matches!(self.settings.system_id, SystemId::Fixed(_)) {
             self.start_speaking(now);
         }
-        if self.decoder.poll_timeout().is_some_and(|at| at <= now) {
-            self.decoder.handle_timeout(now);
-            self.read_frames(now);
+    }
+
+    fn handle_frame(&mut self, now: Timestamp, frame: &Frame<'_>) {
+        if let Some(heartbeat) = frame.decode::<HEARTBEAT_DATA>() {
+            self.handle_heartbeat(now, frame.source(), &heartbeat);
+            return;
         }
-        self.send_due(now);
+        if self.vehicle == Some(frame.source())
+            && let Some(attitude) = frame.decode::<ATTITUDE_DATA>()
+        {
+            self.ride(now, &attitude);
+        }
+        if !self.is_speaking || !frame.target().includes(self.id()) {
+            return;
+        }
+        if let Some(command) = Command::read(frame) {
+            self.handle_command(now, &command);
+        } else {
+            self.parameters.handle_frame(now, frame, &mut self.line.outbox);
+        }
     }
 
-    fn poll_output(&mut self) -> Option<Vec<u8>> {
-        self.outbox.poll()
+    fn send_due(&mut self, now: Timestamp) {
+        while let Some(id) = self.streams.pop_due(now) {
+            self.report(now, id);
+        }
+        self.parameters.handle_timeout(now, &mut self.line.outbox);
     }
 
-    fn poll_timeout(&self) -> Option<Timestamp> {
+    fn next_due(&self) -> Option<Timestamp> {
         // Under an id of its own it waits for nobody.
         if !self.is_speaking && matches!(self.settings.system_id, SystemId::Fixed(_)) {
             return Some(self.boot);
         }
-        let timeouts = [self.streams.poll_timeout(), self.parameters.poll_timeout(), self.decoder.poll_timeout()];
-        timeouts.into_iter().flatten().min()
+        [self.streams.poll_timeout(), self.parameters.poll_timeout()].into_iter().flatten().min()
     }
 
-    fn handle_reboot(&mut self, now: Timestamp) {
+    fn restart(&mut self, now: Timestamp) {
         *self = Self::new(now, self.settings.clone());
     }
 
-    fn handle_disturbance(&mut self, now: Timestamp, motion: PlatformMotion) {
+    fn carry(&mut self, now: Timestamp, motion: PlatformMotion) {
         self.is_carried = true;
         self.plant.advance(now);
         self.plant.set_platform(now, motion);

@@ -3,7 +3,6 @@
 //! It obeys `GIMBAL_DEVICE_SET_ATTITUDE` of one manager only, says where it looks in
 //! `GIMBAL_DEVICE_ATTITUDE_STATUS`, and knows North as long as its autopilot tells it the heading.
 
-mod heading;
 mod latch;
 mod reports;
 mod setpoint;
@@ -12,26 +11,26 @@ mod steering;
 
 use std::time::Duration;
 
-pub use settings::{DeviceSettings, Retract, StatusFrame, Strictness, SystemId};
+pub use settings::{DeviceSettings, Retract, StatusFrame, Strictness};
 
-use self::heading::{HeadingBelief, HeadingSource};
 use self::latch::ManagerLatch;
 use self::setpoint::Mode;
 use crate::geometry::{Angle, AngularRate, Attitude, EarthFrame};
 use crate::sim::command::Command;
-use crate::sim::outbox::Outbox;
+use crate::sim::component::{Component, Line};
+use crate::sim::heading::{HeadingBelief, HeadingSource};
 use crate::sim::parameters::{IntegerEncoding, ParameterServer, ParameterValue};
-use crate::sim::peer::{Peer, PlatformMotion};
+use crate::sim::peer::PlatformMotion;
 use crate::sim::plant::Plant;
 use crate::sim::streams::Streams;
+pub use crate::sim::system_id::SystemId;
 use crate::timestamp::Timestamp;
-use crate::wire::decoder::Patience;
 use crate::wire::dialect::{
     ATTITUDE_DATA, AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA, GIMBAL_MANAGER_STATUS_DATA, HEARTBEAT_DATA,
     STORM32_GIMBAL_MANAGER_STATUS_DATA,
 };
 use crate::wire::ids::{CommandResult, FailureFlags, command, component, mav_type, message};
-use crate::wire::{Frame, MavId, StreamDecoder};
+use crate::wire::{Frame, MavId};
 
 /// System id while no autopilot was heard.
 const FIRST_SYSTEM: u8 = 1;
@@ -40,9 +39,6 @@ const HEARTBEAT_INTERVAL: Duration = Duration::from_secs(1);
 /// Of the attitude status before the first setpoint, and after it.
 const IDLE_INTERVAL: Duration = Duration::from_millis(250);
 const ACTIVE_INTERVAL: Duration = Duration::from_millis(100);
-
-/// A frame whose rest does not come within this was noise.
-const DECODER_PATIENCE: Duration = Duration::from_millis(100);
 
 /// Setpoints that had no effect.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -64,8 +60,7 @@ pub struct RefusedSetpoints {
 pub struct Device {
     settings: DeviceSettings,
     boot: Timestamp,
-    outbox: Outbox,
-    decoder: StreamDecoder,
+    line: Line,
     streams: Streams,
     parameters: ParameterServer,
     plant: Plant,
@@ -93,8 +88,7 @@ impl Device {
         let parameters = parameters(&settings);
         Self {
             boot: now,
-            outbox: Outbox::new(MavId::new(system, settings.component_id)),
-            decoder: StreamDecoder::new(Patience::Fixed(DECODER_PATIENCE)),
+            line: Line::new(MavId::new(system, settings.component_id)),
             streams: Streams::default(),
             parameters,
             plant: Plant::new(now, settings.plant.clone()),
@@ -114,7 +108,7 @@ impl Device {
     }
 
     pub fn id(&self) -> MavId {
-        self.outbox.source()
+        self.line.id()
     }
 
     /// The mechanics, to look at.
@@ -136,23 +130,6 @@ impl Device {
         self.failures = failures;
     }
 
-    /// Moves the mechanics on, stops rates at the moment they expire, and begins to speak when it is time.
-    fn advance(&mut self, now: Timestamp) {
-        if !self.is_speaking && self.speaks_at().is_some_and(|at| at <= now) {
-            self.start_speaking(now);
-        }
-        if let Some(until) = self.rates_until
-            && until <= now
-        {
-            self.plant.advance(until);
-            self.plant.hold();
-            self.is_yaw_held = true;
-            self.rates_until = None;
-        }
-        self.plant.set_heading_reference(self.heading.is_reference(now));
-        self.plant.advance(now);
-    }
-
     fn start_speaking(&mut self, now: Timestamp) {
         if self.is_speaking {
             return;
@@ -165,32 +142,6 @@ impl Device {
 
     fn speaks_at(&self) -> Option<Timestamp> {
         self.settings.listens_first.map(|wait| self.boot + wait)
-    }
-
-    fn handle_frame(&mut self, now: Timestamp, frame: &Frame<'_>) {
-        let sender = frame.source();
-        if frame.message_id() == message::HEARTBEAT {
-            if let Some(heartbeat) = frame.decode() {
-                self.handle_heartbeat(now, sender, &heartbeat);
-            }
-            return;
-        }
-        if !frame.target().includes(self.id()) {
-            return;
-        }
-        if let Some(command) = Command::read(frame) {
-            if self.is_speaking {
-                self.handle_command(now, &command);
-            }
-            return;
-        }
-        if self.is_speaking && self.parameters.handle_frame(now, frame, &mut self.outbox) {
-            return;
-        }
-        // Nobody of another system steers it or tells it where North is.
-        if sender.system == self.id().system {
-            self.handle_own_system(now, frame);
-        }
     }
 
     fn handle_own_system(&mut self, now: Timestamp, frame: &Frame<'_>) {
@@ -219,7 +170,7 @@ impl Device {
             sender.component == component::AUTOPILOT1 && !mav_type::NOT_A_VEHICLE.contains(&heartbeat.mavtype);
         if is_autopilot && !self.has_adopted && self.settings.system_id == SystemId::Adopt {
             self.has_adopted = true;
-            self.outbox.set_system(sender.system);
+            self.line.outbox.set_system(sender.system);
         }
         if heartbeat.mavtype != mav_type::GCS {
             self.start_speaking(now);
@@ -231,7 +182,7 @@ impl Device {
             command::REQUEST_MESSAGE => {
                 let wanted = command.message_id();
                 if self.can_report(wanted) {
-                    command.acknowledge(&mut self.outbox, CommandResult::Accepted);
+                    command.acknowledge(&mut self.line.outbox, CommandResult::Accepted);
                     self.report(now, wanted, command.params[1]);
                     return;
                 }
@@ -241,20 +192,20 @@ impl Device {
                 let id = command.message_id();
                 let is_settable = id == message::GIMBAL_DEVICE_ATTITUDE_STATUS;
                 if is_settable && self.streams.set_interval(now, id, command.params[1]) {
-                    command.acknowledge(&mut self.outbox, CommandResult::Accepted);
+                    command.acknowledge(&mut self.line.outbox, CommandResult::Accepted);
                     return;
                 }
                 CommandResult::Denied
             }
             command::GET_MESSAGE_INTERVAL => {
-                command.acknowledge(&mut self.outbox, CommandResult::Accepted);
+                command.acknowledge(&mut self.line.outbox, CommandResult::Accepted);
                 self.report(now, message::MESSAGE_INTERVAL, command.params[0]);
                 return;
             }
             _ => CommandResult::Unsupported,
         };
         if command.is_directed() {
-            command.acknowledge(&mut self.outbox, answer);
+            command.acknowledge(&mut self.line.outbox, answer);
         }
     }
 
@@ -289,55 +240,77 @@ impl Device {
         let heading = heading.nearest_to(self.plant.platform_heading(now));
         self.plant.set_platform(now, PlatformMotion { heading, heading_rate, roll_rate, pitch_rate });
     }
+}
+
+impl Component for Device {
+    fn line(&self) -> &Line {
+        &self.line
+    }
+
+    fn line_mut(&mut self) -> &mut Line {
+        &mut self.line
+    }
+
+    /// Moves the mechanics on, stops rates at the moment they expire, and begins to speak when it is time.
+    fn advance(&mut self, now: Timestamp) {
+        if !self.is_speaking && self.speaks_at().is_some_and(|at| at <= now) {
+            self.start_speaking(now);
+        }
+        if let Some(until) = self.rates_until
+            && until <= now
+        {
+            self.plant.advance(until);
+            self.plant.hold();
+            self.is_yaw_held = true;
+            self.rates_until = None;
+        }
+        self.plant.set_heading_reference(self.heading.is_reference(now));
+        self.plant.advance(now);
+    }
+
+    fn handle_frame(&mut self, now: Timestamp, frame: &Frame<'_>) {
+        let sender = frame.source();
+        if frame.message_id() == message::HEARTBEAT {
+            if let Some(heartbeat) = frame.decode() {
+                self.handle_heartbeat(now, sender, &heartbeat);
+            }
+            return;
+        }
+        if !frame.target().includes(self.id()) {
+            return;
+        }
+        if let Some(command) = Command::read(frame) {
+            if self.is_speaking {
+                self.handle_command(now, &command);
+            }
+            return;
+        }
+        if self.is_speaking && self.parameters.handle_frame(now, frame, &mut self.line.outbox) {
+            return;
+        }
+        // Nobody of another system steers it or tells it where North is.
+        if sender.system == self.id().system {
+            self.handle_own_system(now, frame);
+        }
+    }
 
     fn send_due(&mut self, now: Timestamp) {
         while let Some(id) = self.streams.pop_due(now) {
             self.report(now, id, 0.0);
         }
-        self.parameters.handle_timeout(now, &mut self.outbox);
+        self.parameters.handle_timeout(now, &mut self.line.outbox);
     }
 
-    fn read_frames(&mut self, now: Timestamp) {
-        let mut decoder = std::mem::take(&mut self.decoder);
-        while let Some(frame) = decoder.next_frame() {
-            self.handle_frame(now, &frame);
-        }
-        self.decoder = decoder;
-    }
-}
-
-impl Peer for Device {
-    fn handle_received(&mut self, now: Timestamp, bytes: &[u8]) {
-        self.advance(now);
-        self.decoder.push(now, bytes);
-        self.read_frames(now);
-        self.send_due(now);
-    }
-
-    fn handle_timeout(&mut self, now: Timestamp) {
-        self.advance(now);
-        if self.decoder.poll_timeout().is_some_and(|at| at <= now) {
-            self.decoder.handle_timeout(now);
-            self.read_frames(now);
-        }
-        self.send_due(now);
-    }
-
-    fn poll_output(&mut self) -> Option<Vec<u8>> {
-        self.outbox.poll()
-    }
-
-    fn poll_timeout(&self) -> Option<Timestamp> {
+    fn next_due(&self) -> Option<Timestamp> {
         let speaks = if self.is_speaking { self.streams.poll_timeout() } else { self.speaks_at() };
-        let others = [self.parameters.poll_timeout(), self.decoder.poll_timeout(), self.rates_until];
-        others.into_iter().chain([speaks]).flatten().min()
+        [self.parameters.poll_timeout(), self.rates_until, speaks].into_iter().flatten().min()
     }
 
-    fn handle_reboot(&mut self, now: Timestamp) {
+    fn restart(&mut self, now: Timestamp) {
         *self = Self::new(now, self.settings.clone());
     }
 
-    fn handle_disturbance(&mut self, now: Timestamp, motion: PlatformMotion) {
+    fn carry(&mut self, now: Timestamp, motion: PlatformMotion) {
         self.is_carried = true;
         self.advance(now);
         self.plant.set_platform(now, motion);

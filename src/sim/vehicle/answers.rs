@@ -45,7 +45,7 @@ impl Vehicle {
         let sender = frame.source();
         if let Some(command) = Command::read(frame) {
             self.handle_command(now, &command);
-        } else if self.parameters.handle_frame(now, frame, &mut self.outbox) {
+        } else if self.parameters.handle_frame(now, frame, &mut self.line.outbox) {
             // It has answered.
         } else if let Some(request) = frame.decode() {
             self.handle_mission_request_list(sender, &request);
@@ -84,10 +84,10 @@ impl Vehicle {
             command::REQUEST_PROTOCOL_VERSION => return self.handle_request_message(now, command, PROTOCOL_VERSION),
             command::SET_MESSAGE_INTERVAL => self.handle_set_message_interval(now, command),
             command::GET_MESSAGE_INTERVAL => {
-                command.acknowledge(&mut self.outbox, CommandResult::Accepted);
+                command.acknowledge(&mut self.line.outbox, CommandResult::Accepted);
                 let id = command.message_id();
                 let interval_us = self.streams.interval_us(id);
-                self.outbox.send(&MESSAGE_INTERVAL_DATA { interval_us, message_id: id as u16 });
+                self.line.outbox.send(&MESSAGE_INTERVAL_DATA { interval_us, message_id: id as u16 });
                 return;
             }
             COMPONENT_ARM_DISARM => {
@@ -105,7 +105,7 @@ impl Vehicle {
             _ if command.is_directed() => CommandResult::Unsupported,
             _ => return,
         };
-        command.acknowledge(&mut self.outbox, result);
+        command.acknowledge(&mut self.line.outbox, result);
         if matches!(command.number, COMPONENT_ARM_DISARM | DO_SET_MODE) {
             self.report(now, message::HEARTBEAT);
         }
@@ -114,17 +114,17 @@ impl Vehicle {
     fn handle_request_message(&mut self, now: Timestamp, command: &Command, id: u32) {
         let is_known = self.streams.contains(id) || matches!(id, message::AUTOPILOT_VERSION | PROTOCOL_VERSION);
         if is_known {
-            command.acknowledge(&mut self.outbox, CommandResult::Accepted);
+            command.acknowledge(&mut self.line.outbox, CommandResult::Accepted);
             self.report(now, id);
         } else if self.is_mount_message(id) || self.promises(id) {
             // Without a mount ArduPilot accepts, and sends nothing (observed on its simulator).
-            command.acknowledge(&mut self.outbox, CommandResult::Accepted);
+            command.acknowledge(&mut self.line.outbox, CommandResult::Accepted);
         } else if command.is_directed() {
             let result = match self.settings.autopilot {
                 Autopilot::Px4 => CommandResult::Denied,
                 Autopilot::ArduPilot => CommandResult::Failed,
             };
-            command.acknowledge(&mut self.outbox, result);
+            command.acknowledge(&mut self.line.outbox, result);
         }
     }
 
@@ -148,7 +148,7 @@ impl Vehicle {
     }
 
     fn handle_mission_request_list(&mut self, sender: MavId, request: &MISSION_REQUEST_LIST_DATA) {
-        self.outbox.send(&MISSION_COUNT_DATA {
+        self.line.outbox.send(&MISSION_COUNT_DATA {
             count: 0,
             target_system: sender.system,
             target_component: sender.component,
@@ -158,7 +158,7 @@ impl Vehicle {
     }
 
     fn acknowledge_mission(&mut self, sender: MavId, result: u8, mission_type: u8) {
-        self.outbox.send(&MISSION_ACK_DATA {
+        self.line.outbox.send(&MISSION_ACK_DATA {
             target_system: sender.system,
             target_component: sender.component,
             mavtype: result,
@@ -183,7 +183,7 @@ impl Vehicle {
             payload[ftp::SIZE] = 1;
             payload[ftp::DATA] = ftp::FILE_NOT_FOUND;
         }
-        self.outbox.send(&FILE_TRANSFER_PROTOCOL_DATA {
+        self.line.outbox.send(&FILE_TRANSFER_PROTOCOL_DATA {
             target_network: 0,
             target_system: sender.system,
             target_component: sender.component,
@@ -197,7 +197,7 @@ impl Vehicle {
             return;
         }
         let nanoseconds = i64::try_from(self.clock(now).as_micros() * 1_000).unwrap_or(i64::MAX);
-        self.outbox.send(&TIMESYNC_DATA {
+        self.line.outbox.send(&TIMESYNC_DATA {
             tc1: nanoseconds,
             ts1: request.ts1,
             target_system: sender.system,
@@ -210,7 +210,7 @@ impl Vehicle {
             // "If the target is not zero this is an answer."
             return;
         }
-        self.outbox.send(&PING_DATA {
+        self.line.outbox.send(&PING_DATA {
             time_usec: ping.time_usec,
             seq: ping.seq,
             target_system: sender.system,

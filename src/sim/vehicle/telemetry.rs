@@ -98,11 +98,11 @@ impl Vehicle {
         let time_boot_ms = self.clock(now).boot_ms();
         let time_usec = self.clock(now).as_micros();
         let system = self.id().system;
-        let out = &mut self.outbox;
+        let out = &mut self.line.outbox;
         match id {
             message::HEARTBEAT => {
                 let heartbeat = self.heartbeat();
-                self.outbox.send(&heartbeat);
+                self.line.outbox.send(&heartbeat);
             }
             message::SYS_STATUS => out.send(&SYS_STATUS_DATA {
                 onboard_control_sensors_present: SENSORS,
@@ -208,7 +208,7 @@ impl Vehicle {
             BATTERY_STATUS => out.send(&battery_status()),
             message::AUTOPILOT_VERSION => {
                 let version = self.version();
-                self.outbox.send(&version);
+                self.line.outbox.send(&version);
             }
             EKF_STATUS_REPORT => out.send(&EKF_STATUS_REPORT_DATA {
                 velocity_variance: 0.02,

@@ -1,6 +1,7 @@
 use super::telemetry::{EKF_STATUS_REPORT, ESTIMATOR_STATUS};
 use super::*;
 use crate::geometry::{Attitude, EarthFrame, Position};
+use crate::sim::peer::Peer;
 use crate::wire::dialect::*;
 use crate::wire::ids::{command, message};
 use crate::wire::{DatagramFrames, encode_to_vec};

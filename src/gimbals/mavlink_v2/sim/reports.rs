@@ -25,7 +25,7 @@ impl Device {
     /// Sends message `id`; `argument` says of which message an interval is wanted.
     pub(super) fn report(&mut self, now: Timestamp, id: u32, argument: f64) {
         match id {
-            message::HEARTBEAT => self.outbox.send(&HEARTBEAT_DATA {
+            message::HEARTBEAT => self.line.outbox.send(&HEARTBEAT_DATA {
                 custom_mode: 0,
                 mavtype: mav_type::GIMBAL,
                 autopilot: mav_autopilot::INVALID,
@@ -37,15 +37,15 @@ impl Device {
                 // A float cast saturates, and turns NaN into 0.
                 let message_id = argument.round() as u16;
                 let interval_us = self.streams.interval_us(u32::from(message_id));
-                self.outbox.send(&MESSAGE_INTERVAL_DATA { interval_us, message_id });
+                self.line.outbox.send(&MESSAGE_INTERVAL_DATA { interval_us, message_id });
             }
             message::GIMBAL_DEVICE_INFORMATION => {
                 let information = self.information(now);
-                self.outbox.send(&information);
+                self.line.outbox.send(&information);
             }
             message::GIMBAL_DEVICE_ATTITUDE_STATUS => {
                 let status = self.attitude_status(now);
-                self.outbox.send(&status);
+                self.line.outbox.send(&status);
             }
             _ => {}
         }

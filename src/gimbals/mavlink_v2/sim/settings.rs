@@ -4,12 +4,14 @@ use std::time::Duration;
 
 use crate::geometry::{Angle, AxisLimits, Limits};
 use crate::sim::plant::PlantSettings;
+use crate::sim::system_id::SystemId;
 use crate::wire::ids::{CapFlags, component};
 
 /// Everything that differs from one v2 device to another.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DeviceSettings {
     pub component_id: u8,
+    /// Until a vehicle is heard, 1.
     pub system_id: SystemId,
     /// How long it listens for a heartbeat other than a ground station's before it speaks; for ever when `None`.
     pub listens_first: Option<Duration>,
@@ -29,14 +31,6 @@ pub struct DeviceSettings {
     /// How long a rate holds that is not repeated; for ever when `None`.
     pub rate_expiry: Option<Duration>,
     pub plant: PlantSettings,
-}
-
-/// Under which system id the device speaks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SystemId {
-    /// That of the first autopilot it hears, and 1 until then.
-    Adopt,
-    Fixed(u8),
 }
 
 /// Which frame flags of `GIMBAL_DEVICE_SET_ATTITUDE` the device takes.

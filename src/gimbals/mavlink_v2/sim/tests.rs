@@ -1,5 +1,6 @@
 use super::*;
 use crate::geometry::{AircraftAngles, AxisLimits, GimbalAngles, Limits};
+use crate::sim::peer::Peer;
 use crate::sim::plant::PlantSettings;
 use crate::wire::dialect::{
     COMMAND_ACK_DATA, COMMAND_LONG_DATA, CharArray, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA,

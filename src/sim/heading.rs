@@ -1,4 +1,4 @@
-//! Where the device believes North is: the heading that its autopilot tells it.
+//! Where a simulated gimbal believes North is: the heading that its autopilot tells it.
 
 use std::time::Duration;
 
