@@ -3,18 +3,19 @@
 //! It obeys `GIMBAL_DEVICE_SET_ATTITUDE` of one manager only, says where it looks in
 //! `GIMBAL_DEVICE_ATTITUDE_STATUS`, and knows North as long as its autopilot tells it the heading.
 
-mod latch;
+pub mod latch;
+mod obedience;
 mod reports;
-mod setpoint;
+pub mod setpoint;
 mod settings;
-mod steering;
+pub mod steering;
 
 use std::time::Duration;
 
 pub use settings::{DeviceSettings, Retract, StatusFrame, Strictness};
 
 use self::latch::ManagerLatch;
-use self::setpoint::Mode;
+use self::steering::Steering;
 use crate::geometry::{Angle, AngularRate, Attitude, EarthFrame};
 use crate::sim::command::Command;
 use crate::sim::component::{Component, Line};
@@ -66,15 +67,12 @@ pub struct Device {
     plant: Plant,
     heading: HeadingBelief,
     latch: ManagerLatch,
-    mode: Mode,
+    steering: Steering,
     has_adopted: bool,
     is_speaking: bool,
     was_steered: bool,
     /// The vehicle's motion comes from outside, and not from what the autopilot says of it.
     is_carried: bool,
-    rates_until: Option<Timestamp>,
-    /// Yaw stays where it was last caught, and does not go to an angle or turn.
-    is_yaw_held: bool,
     failures: FailureFlags,
     refused: RefusedSetpoints,
 }
@@ -94,13 +92,11 @@ impl Device {
             plant: Plant::new(now, settings.plant.clone()),
             heading: HeadingBelief::default(),
             latch: ManagerLatch::default(),
-            mode: Mode::Free,
+            steering: Steering::default(),
             has_adopted: false,
             is_speaking: false,
             was_steered: false,
             is_carried: false,
-            rates_until: None,
-            is_yaw_held: false,
             failures: FailureFlags::empty(),
             refused: RefusedSetpoints::default(),
             settings,
@@ -256,14 +252,7 @@ impl Component for Device {
         if !self.is_speaking && self.speaks_at().is_some_and(|at| at <= now) {
             self.start_speaking(now);
         }
-        if let Some(until) = self.rates_until
-            && until <= now
-        {
-            self.plant.advance(until);
-            self.plant.hold();
-            self.is_yaw_held = true;
-            self.rates_until = None;
-        }
+        self.steering.expire(now, &mut self.plant);
         self.plant.set_heading_reference(self.heading.is_reference(now));
         self.plant.advance(now);
     }
@@ -303,7 +292,7 @@ impl Component for Device {
 
     fn next_due(&self) -> Option<Timestamp> {
         let speaks = if self.is_speaking { self.streams.poll_timeout() } else { self.speaks_at() };
-        [self.parameters.poll_timeout(), self.rates_until, speaks].into_iter().flatten().min()
+        [self.parameters.poll_timeout(), self.steering.rates_until(), speaks].into_iter().flatten().min()
     }
 
     fn restart(&mut self, now: Timestamp) {

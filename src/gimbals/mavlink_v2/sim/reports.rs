@@ -95,7 +95,7 @@ impl Device {
     fn attitude_status(&mut self, now: Timestamp) -> GIMBAL_DEVICE_ATTITUDE_STATUS_DATA {
         let pose = self.plant.measure(now);
         let heading = self.heading.at(now);
-        let locked = self.mode == Mode::Free && self.plant.yaw_hold() == YawHold::Horizon;
+        let locked = self.steering.mode() == Mode::Free && self.plant.yaw_hold() == YawHold::Horizon;
         let in_earth = match self.settings.status_frame {
             StatusFrame::EarthWhenKnown => heading,
             StatusFrame::FollowsLock => heading.filter(|_| locked),
@@ -136,7 +136,7 @@ impl Device {
     }
 
     fn flags(&self, locked: bool, knows_heading: bool, in_earth: bool) -> GimbalFlags {
-        let mut flags = match self.mode {
+        let mut flags = match self.steering.mode() {
             // Retracted it does not stabilise.
             Mode::Retract => GimbalFlags::RETRACT,
             Mode::Neutral => GimbalFlags::NEUTRAL | GimbalFlags::ROLL_LOCK | GimbalFlags::PITCH_LOCK,
