@@ -21,6 +21,8 @@ mod own_commands;
 mod own_system;
 pub mod pacing;
 mod picture;
+mod presented_device;
+mod presenting;
 mod rates;
 mod receiving;
 mod rivals;
@@ -50,6 +52,7 @@ use conflicts::Conflicts;
 use events::Events;
 use identity::Identity;
 use outbox::Outbox;
+use presenting::Presented;
 use rivals::RivalWatch;
 use roster::Roster;
 use settings::{Role, Settings};
@@ -140,6 +143,7 @@ pub struct Bridge {
     stations: Stations,
     watch: RivalWatch,
     asked: UnderWay,
+    presented: Presented,
     outbox: Outbox,
     buffer: FrameBuffer,
     timers: TimerTable<Timer>,
@@ -184,6 +188,7 @@ impl Bridge {
             stations: Stations::default(),
             watch: RivalWatch::default(),
             asked: UnderWay::default(),
+            presented: Presented::new(settings.present_device),
             outbox: Outbox::default(),
             buffer: FrameBuffer::default(),
             timers: TimerTable::default(),
@@ -248,6 +253,7 @@ impl Bridge {
         self.ask_autopilot(now);
         self.tell_gimbals_state(now);
         self.measure_round_trip(now);
+        self.tell_as_presented(now);
         for at in 0..self.roster.len() {
             let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
             let gimbal = self.roster.get_mut(at);
@@ -280,6 +286,7 @@ impl Bridge {
             self.asked.poll_timeout(),
             self.state_for_gimbals.poll_timeout(),
             self.timesync_due(),
+            self.presented_due(),
         ];
         let gimbals = self.roster.iter().filter_map(|gimbal| gimbal.poll_timeout());
         let gimbals = gimbals.filter(|_| self.identity.system().is_some());
@@ -298,6 +305,9 @@ impl Bridge {
         self.router.close_channel(channel);
         self.router.open_channel(channel);
         self.roster.open_channel(now, channel);
+        if self.channels.role(channel) == Some(Role::Autopilot) {
+            self.presented.open_channel(now, channel);
+        }
         // A gimbal takes the system id of the first heartbeat it hears, so ours is the first there.
         if self.channels.role(channel) == Some(Role::Gimbal) && self.identity.system().is_some() {
             self.beat(now, channel.into());
@@ -308,6 +318,7 @@ impl Bridge {
         self.channels.close(channel);
         self.router.close_channel(channel);
         self.roster.close_channel(channel);
+        self.presented.close_channel(channel);
     }
 
     /// The managers are shown what is known of the vehicle, also when nothing new was heard of it.
@@ -335,6 +346,7 @@ impl Bridge {
                     self.send(now, self.channels.open_set(), component, &goodbye);
                 }
             }
+            self.say_goodbye_as_presented(now);
         }
         self.asked.end_all(&mut self.outbox);
         self.shutting_down = true;

@@ -15,6 +15,7 @@ pub mod settings;
 pub mod tracking;
 pub mod voice;
 
+mod autopilot_client;
 mod commands;
 mod device;
 mod heading;
@@ -39,6 +40,7 @@ use crate::vehicle::Vehicle;
 use crate::wire::dialect::MavMessage;
 use crate::wire::ids::GimbalFlags;
 use crate::wire::{MavId, Target};
+use autopilot_client::AutopilotClient;
 use commands::LastCommand;
 use control::{Control, Voice};
 use events::{Event, RatesEnd};
@@ -161,6 +163,8 @@ pub struct GimbalManager {
     /// What the last 280 said of pointing at places.
     told_can_aim: bool,
     last_command: Option<LastCommand>,
+    /// The autopilot as far as it drives the gimbal as a device of its own.
+    autopilot_client: AutopilotClient,
     configured_inputs: ConfiguredInputs,
     /// What is being done in the place of where the gimbal was told to look: it is not told that again meanwhile.
     paused_by: Option<OperationId>,
@@ -195,6 +199,7 @@ impl GimbalManager {
             told_roi: None,
             told_can_aim: false,
             last_command: None,
+            autopilot_client: AutopilotClient::default(),
             configured_inputs: ConfiguredInputs::default(),
             paused_by: None,
             rejected: BTreeMap::new(),
@@ -266,6 +271,7 @@ impl GimbalManager {
 
     pub fn handle_timeout(&mut self, now: Timestamp, around: Surroundings<'_>) {
         self.end_leases(now);
+        self.give_back_for_autopilot(now, around);
         if self.source_lost_at().is_some_and(|at| at <= now) {
             self.tracking.stop_rates(now);
             if let Some(who) = self.tracking.source() {
@@ -301,7 +307,8 @@ impl GimbalManager {
         let schedules = schedules.into_iter().flatten().filter(|_| self.device.is_some());
         let lease = self.rules.lease_timeout;
         let tracking = self.tracking.poll_timeout().filter(|_| self.paused_by.is_none());
-        let rest = [tracking, self.control.poll_timeout(lease), self.source_lost_at()];
+        let rest =
+            [tracking, self.control.poll_timeout(lease), self.source_lost_at(), self.autopilot_client.poll_timeout()];
         schedules.chain(rest.into_iter().flatten()).min()
     }
 

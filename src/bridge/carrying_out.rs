@@ -71,6 +71,13 @@ impl Bridge {
                     // A gimbal has no use for what a manager tells its clients.
                     channels = channels.without(self.channels.with_role(Role::Gimbal));
                 }
+                if matches!(
+                    *message,
+                    MavMessage::GIMBAL_DEVICE_INFORMATION(_) | MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(_)
+                ) {
+                    // The autopilot sees the presented device, and would not tell the two apart.
+                    channels = channels.without(self.channels_presenting(component));
+                }
                 self.send(now, channels, component, &message);
             }
             ManagerOutput::Heartbeat { channels } => {

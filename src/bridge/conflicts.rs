@@ -21,6 +21,8 @@ pub enum Conflict {
     RivalManager { rival: MavId, device_id: u8, autopilot: Option<Autopilot> },
     /// Somebody else steers a gimbal of ours directly.
     RivalMaster { rival: MavId, device: MavId, autopilot: Option<Autopilot>, outcome: Outcome },
+    /// The autopilot drives the device that we present to it by mount commands, which is not how it is meant.
+    MountCommandsToPresented { device: MavId },
     /// A gimbal speaks the manager's messages for itself.
     DeviceActsAsManager { device: MavId },
     /// Somebody else sends as us.
@@ -86,14 +88,26 @@ impl Conflict {
                 remedy(*autopilot, mount_of(*device_id))
             ),
             Self::RivalMaster { rival, device, autopilot, outcome } => {
-                let outcome = match outcome {
-                    Outcome::KeptAway => "its setpoints are not delivered",
-                    Outcome::Delivered => "its setpoints fight with ours",
-                    Outcome::BesideUs => "its setpoints reach it without passing here, and fight with ours",
+                let (outcome, may_be_hosted) = match outcome {
+                    Outcome::KeptAway => ("its setpoints are not delivered", true),
+                    Outcome::Delivered => ("its setpoints fight with ours", true),
+                    Outcome::BesideUs => ("its setpoints reach it without passing here, and fight with ours", false),
                 };
-                let remedy = remedy(*autopilot, mount_of(device.component));
-                format!("{rival} steers gimbal {device} directly; {outcome}. {remedy}")
+                let mount = mount_of(device.component);
+                let instead = match autopilot {
+                    Some(Autopilot::ArduPilot) if may_be_hosted => {
+                        format!(" Or let it steer through us: MNT{mount}_TYPE 6 and [autopilot] present_device = true.")
+                    }
+                    _ => String::new(),
+                };
+                let remedy = remedy(*autopilot, mount);
+                format!("{rival} steers gimbal {device} directly; {outcome}. {remedy}{instead}")
             }
+            Self::MountCommandsToPresented { device } => format!(
+                "the autopilot drives {device}, which we present to it, by mount commands. On ArduPilot set MNT{}_TYPE \
+                 to 6 and restart it.",
+                mount_of(device.component)
+            ),
             Self::DeviceActsAsManager { device } => format!(
                 "gimbal {device} acts as its own manager; its messages 280 and 281 are kept on its link. Set it to \
                  gimbal device mode."

@@ -28,12 +28,12 @@ impl Bridge {
             return;
         };
         let ours = self.is_own_id(source);
+        // R13: what we sent ourselves and came back is dropped; what another sends under our name is forwarded.
+        if (ours || self.is_presented(source)) && self.channels.was_sent(frame.bytes()) {
+            self.count_dropped(link, "loop");
+            return;
+        }
         if ours {
-            // R13: what we sent ourselves and came back is dropped; what another sends under our name is forwarded.
-            if self.channels.was_sent(frame.bytes()) {
-                self.count_dropped(link, "loop");
-                return;
-            }
             self.conflicts.note(now, Conflict::OwnIdInUse { id: source });
         } else if frame.is_known() {
             // R8, and R6: a message that is not known could not be checked, so nothing is learned from it.
@@ -71,6 +71,11 @@ impl Bridge {
             self.handle_device(now, Place { link, channel: from }, role, frame);
         }
         self.handle_for_us(now, from, frame);
+        if self.handle_for_presented(now, Place { link, channel: from }, role, frame)
+            || self.is_of_hosted_manager(link, frame)
+        {
+            return;
+        }
         self.forward(now, Place { link, channel: from }, role, frame);
     }
 
@@ -225,6 +230,7 @@ impl Bridge {
             let known = self.router.routes().component_channels(frame.source());
             channels = channels.union(self.channels.with_role(Role::Gimbal).without(from.into()).without(known));
         }
+        channels = self.keep_apart_from_presented(frame, channels);
         channels = self.firewall(now, Place { link, channel: from }, role, frame, channels);
         if matches!(frame.message_id(), message::RADIO_STATUS | message::RADIO) {
             // R17: an autopilot would throttle the wrong channel by it.
@@ -266,7 +272,10 @@ impl Bridge {
     fn is_state_for_gimbals(&self, frame: &Frame<'_>) -> bool {
         frame.message_id() == message::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE
             && self.autopilot == Some(frame.source())
-            && !matches!(frame.target(), Target::Component(_))
+            && match frame.target() {
+                Target::Component(target) => self.is_presented(target),
+                Target::System(_) | Target::Everyone => true,
+            }
     }
 
     /// R18: which of `gimbals`, all of that role, get the frame: what is addressed to a component known there, and

@@ -26,6 +26,7 @@ impl Bridge {
             return;
         }
         self.beat(now, self.channels.open_set());
+        self.beat_as_presented(now);
         self.handle_vehicle(now);
         if self.identity.has_several(now) && self.settings.system_id == SystemId::Auto {
             self.conflicts.note(now, Conflict::SeveralAutopilots);
@@ -78,14 +79,18 @@ impl Bridge {
 
 /// `HEARTBEAT` of one manager; its state is that of its gimbal.
 pub fn heartbeat(gimbal: &Gimbal, bootstrap: bool) -> MavMessage {
-    let state = match gimbal.manager.state() {
+    messages::heartbeat(gimbal.mav_type(), state(gimbal, bootstrap))
+}
+
+/// `MAV_STATE` of who speaks for a gimbal.
+pub fn state(gimbal: &Gimbal, bootstrap: bool) -> u8 {
+    match gimbal.manager.state() {
         _ if bootstrap => mav_state::BOOT,
         DeviceState::Searching => mav_state::STANDBY,
         DeviceState::Alive if gimbal.manager.has_hard_failure() => mav_state::CRITICAL,
         DeviceState::Alive => mav_state::ACTIVE,
         DeviceState::Lost => mav_state::CRITICAL,
-    };
-    messages::heartbeat(gimbal.mav_type(), state)
+    }
 }
 
 /// The last one of a manager that is going away.

@@ -144,6 +144,7 @@ impl Bridge {
             }),
             flags: gimbal_flag_names(manager.flags()),
             failure_flags: failure_flag_names(failures),
+            presented: self.presented_snapshot(now, gimbal.component),
             details: gimbal.driver.details(now),
             rejected: manager
                 .rejected()

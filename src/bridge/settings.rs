@@ -15,6 +15,8 @@ pub struct Settings {
     pub links: Vec<LinkSettings>,
     pub gimbals: Vec<GimbalSettings>,
     pub control: ControlSettings,
+    /// Gimbals are presented to the autopilot as gimbal devices of its own (D18).
+    pub present_device: bool,
 }
 
 /// Where our system id comes from.

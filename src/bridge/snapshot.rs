@@ -139,11 +139,26 @@ pub struct GimbalSnapshot {
     pub roi: Option<RoiSnapshot>,
     pub flags: Vec<String>,
     pub failure_flags: Vec<String>,
+    /// What the autopilot sees of it, where it is presented to it.
+    #[serde(default)]
+    pub presented: Option<PresentedSnapshot>,
     /// Sender to reason to count: what was refused.
     pub rejected: BTreeMap<String, BTreeMap<String, u64>>,
     /// What only its family knows of it.
     #[serde(default)]
     pub details: GimbalDetails,
+}
+
+/// A gimbal as the autopilot sees it (`[autopilot] present_device`).
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PresentedSnapshot {
+    /// The device's `system/component` there.
+    pub device: String,
+    /// What the autopilot's stream of setpoints does: `silent`, `steady` when it asks for nothing new, `asks`, or
+    /// `overruled` while it goes on moving after somebody else took over.
+    pub stream: String,
+    /// Since it last asked for something.
+    pub asked_age_ms: Option<u64>,
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -6,6 +6,7 @@ use std::net::{IpAddr, SocketAddr};
 use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
 
+use crate::bridge::settings::Role;
 use crate::channel::ChannelId;
 use crate::endpoint::Endpoint;
 
@@ -21,7 +22,7 @@ use super::suggestion;
 const MAX_LINKS: usize = ChannelId::COUNT / 2;
 
 pub(super) fn check(configuration: &Configuration, problems: &mut Vec<Problem>) {
-    let Configuration { links, gimbals, http, .. } = configuration;
+    let Configuration { links, gimbals, autopilot, http, .. } = configuration;
     // A link section of the wrong kind has been reported.
     if links.is_empty() && !problems.iter().any(|problem| problem.key == "link") {
         problems.push(Problem {
@@ -50,7 +51,12 @@ pub(super) fn check(configuration: &Configuration, problems: &mut Vec<Problem>) 
             problems.push(link.problem(format!("found {}", link.shown), expected));
         }
     }
-    numbering::check(gimbals, problems);
+    let presents = autopilot.present_device.as_ref().filter(|present| present.value);
+    let has_autopilot = links.iter().any(|link| link.role.as_ref().is_none_or(|role| role.value == Role::Autopilot));
+    if let Some(presents) = presents.filter(|_| !has_autopilot) {
+        problems.push(presents.problem(format!("found {}", presents.shown), "false, or a link of role autopilot"));
+    }
+    numbering::check(gimbals, presents.is_some(), problems);
     // Every endpoint is compared with every other: not with those that cannot stay.
     check_endpoints(&links[..links.len().min(MAX_LINKS)], http, problems);
     check_token_file(http, problems);

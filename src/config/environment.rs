@@ -11,7 +11,7 @@ pub(super) const PREFIX: &str = "GIMBALD__";
 const SEPARATOR: &str = "__";
 
 /// Sections that there is one of.
-const SINGLE: [&str; 4] = ["vehicle", "control", "roi", "http"];
+const SINGLE: [&str; 5] = ["vehicle", "autopilot", "control", "roi", "http"];
 /// Sections whose entries are told apart by their name.
 const NAMED: [&str; 2] = ["link", "gimbal"];
 
@@ -59,8 +59,8 @@ fn lay_over(root: &mut Table, path: &str, value: Value) -> Result<(), (String, S
         let hint = suggestion::closest(section, sections)
             .map(|meant| format!("; did you mean {PREFIX}{}__?", meant.to_uppercase()))
             .unwrap_or_default();
-        let expected = "GIMBALD__SECTION__KEY with VEHICLE, CONTROL, ROI or HTTP, or GIMBALD__LINK__NAME__KEY, or \
-                        GIMBALD__GIMBAL__NAME__KEY";
+        let expected = "GIMBALD__SECTION__KEY with VEHICLE, AUTOPILOT, CONTROL, ROI or HTTP, or \
+                        GIMBALD__LINK__NAME__KEY, or GIMBALD__GIMBAL__NAME__KEY";
         return Err(("an unknown variable".to_owned(), format!("{expected}{hint}")));
     };
     if key == "name" {

@@ -12,9 +12,9 @@ use crate::manager::voice::LAST_NUMBER;
 const AUTOMATIC: [u8; 4] = [191, 192, 193, 194];
 
 /// Why the manager of a gimbal may not have a component id, as "component … is …".
-fn reserved(id: u8, gimbal: &Gimbal) -> Option<&'static str> {
-    // The manager of a gimbal that is no v2 device speaks for the device, too.
-    let speaks_for_device = speaks_through_manager(gimbal);
+fn reserved(id: u8, gimbal: &Gimbal, presents_devices: bool) -> Option<&'static str> {
+    // The manager of a gimbal that is no v2 device speaks for the device, too; but not beside one that is presented.
+    let speaks_for_device = speaks_through_manager(gimbal) && !presents_devices;
     match id {
         100..=105 => Some("a camera's"),
         154 | 171..=175 if !speaks_for_device => Some("a gimbal device's"),
@@ -22,8 +22,9 @@ fn reserved(id: u8, gimbal: &Gimbal) -> Option<&'static str> {
     }
 }
 
-pub(super) fn check(gimbals: &[Gimbal], problems: &mut Vec<Problem>) {
-    check_managers(gimbals, problems);
+/// `presents_devices`: gimbals are presented to the autopilot under the component ids of devices.
+pub(super) fn check(gimbals: &[Gimbal], presents_devices: bool, problems: &mut Vec<Problem>) {
+    check_managers(gimbals, presents_devices, problems);
     check_devices(gimbals, problems);
     check_numbers(gimbals, problems);
 }
@@ -48,12 +49,12 @@ fn check_numbers(gimbals: &[Gimbal], problems: &mut Vec<Problem>) {
     }
 }
 
-fn check_managers(gimbals: &[Gimbal], problems: &mut Vec<Problem>) {
+fn check_managers(gimbals: &[Gimbal], presents_devices: bool, problems: &mut Vec<Problem>) {
     const EXPECTED: &str = "a component id from 7 to 255 that nobody else on the vehicle has, for example 195";
     let mut taken = Vec::new();
     for gimbal in gimbals {
         let Some(id) = &gimbal.manager_component_id else { continue };
-        if let Some(owner) = reserved(id.value, gimbal) {
+        if let Some(owner) = reserved(id.value, gimbal, presents_devices) {
             problems.push(id.problem(format!("found {}, which is {owner} id", id.value), EXPECTED));
         } else if taken.contains(&id.value) {
             problems.push(id.problem(format!("found {}, which another gimbal's manager has", id.value), EXPECTED));

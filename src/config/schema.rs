@@ -53,6 +53,7 @@ pub(super) struct Configuration {
     pub vehicle: Vehicle,
     pub links: Vec<Link>,
     pub gimbals: Vec<Gimbal>,
+    pub autopilot: Autopilot,
     pub control: Control,
     pub roi: Roi,
     pub http: Http,
@@ -89,6 +90,11 @@ pub(super) struct Gimbal {
     pub v1_sign: Option<Located<Signs>>,
     pub manual_pitch_rate_dps: Option<Located<f64>>,
     pub manual_yaw_rate_dps: Option<Located<f64>>,
+}
+
+#[derive(Debug, Default)]
+pub(super) struct Autopilot {
+    pub present_device: Option<Located<bool>>,
 }
 
 #[derive(Debug, Default)]
@@ -147,6 +153,10 @@ fn gimbal(section: &mut Section<'_>, place: Place) -> Gimbal {
     }
 }
 
+fn autopilot(section: &mut Section<'_>) -> Autopilot {
+    Autopilot { present_device: section.read("present_device", flag) }
+}
+
 fn control(section: &mut Section<'_>) -> Control {
     Control {
         open_when_unclaimed: section.read("unclaimed", |raw| word(raw, UNCLAIMED)),
@@ -181,6 +191,7 @@ pub fn keys() -> Vec<(&'static str, Vec<&'static str>)> {
         asked("vehicle", vehicle),
         asked("link", |section| link(section, Place::File)),
         asked("gimbal", |section| gimbal(section, Place::File)),
+        asked("autopilot", autopilot),
         asked("control", control),
         asked("roi", roi),
         asked("http", http),
@@ -193,6 +204,7 @@ pub(super) fn read(mut root: Table, problems: &mut Vec<Problem>) -> Configuratio
         vehicle: single(&mut root, "vehicle", problems, vehicle).unwrap_or_default(),
         links: several(&mut root, "link", problems, link),
         gimbals: several(&mut root, "gimbal", problems, gimbal),
+        autopilot: single(&mut root, "autopilot", problems, autopilot).unwrap_or_default(),
         control: single(&mut root, "control", problems, control).unwrap_or_default(),
         roi: single(&mut root, "roi", problems, roi).unwrap_or_default(),
         http: single(&mut root, "http", problems, http).unwrap_or_default(),

@@ -37,7 +37,7 @@ impl HttpSettings {
 
 /// Turns a configuration without problems into settings; unset keys get their defaults here.
 pub(super) fn build(configuration: Configuration, state_directory: Option<PathBuf>) -> DaemonSettings {
-    let Configuration { vehicle, links, gimbals, control, roi, http } = configuration;
+    let Configuration { vehicle, links, gimbals, autopilot, control, roi, http } = configuration;
     let (links, endpoints): (Vec<LinkSettings>, Vec<Endpoint>) = links.into_iter().map(link).unzip();
     let gimbals = gimbals.into_iter().map(|entry| gimbal(entry, &links)).collect();
     DaemonSettings {
@@ -47,6 +47,7 @@ pub(super) fn build(configuration: Configuration, state_directory: Option<PathBu
             links,
             gimbals,
             control: self::control(control, roi),
+            present_device: value_or(autopilot.present_device, Settings::default().present_device),
         },
         endpoints,
         http: Some(self::http(http)),

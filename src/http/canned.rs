@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use crate::bridge::snapshot::{
-    AttitudeSnapshot, EventSnapshot, GimbalSnapshot, LinkSnapshot, PeerSnapshot, RoiSnapshot, SetpointSnapshot,
-    Snapshot, VehicleSnapshot,
+    AttitudeSnapshot, EventSnapshot, GimbalSnapshot, LinkSnapshot, PeerSnapshot, PresentedSnapshot, RoiSnapshot,
+    SetpointSnapshot, Snapshot, VehicleSnapshot,
 };
 use crate::gimbals::details::GimbalDetails;
 
@@ -112,6 +112,11 @@ fn held_gimbal() -> GimbalSnapshot {
         flags: vec!["yaw_lock".into(), "roll_lock".into()],
         failure_flags: vec!["motor_error".into()],
         rejected: BTreeMap::from([("1/100".into(), BTreeMap::from([("not_in_control".into(), 12)]))]),
+        presented: Some(PresentedSnapshot {
+            device: "1/154".into(),
+            stream: "steady".into(),
+            asked_age_ms: Some(12_000),
+        }),
         details: GimbalDetails {
             generation: Some("v2".into()),
             faults: vec!["firmware 7.8.7 reports a wrong yaw from North".into()],

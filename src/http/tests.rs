@@ -65,6 +65,7 @@ fn status_is_the_whole_snapshot() {
                 "roi": {"latitude_deg": 47.4, "longitude_deg": 8.55, "altitude_amsl_m": 430.0},
                 "flags": ["yaw_lock", "roll_lock"], "failure_flags": ["motor_error"],
                 "rejected": {"1/100": {"not_in_control": 12}},
+                "presented": {"device": "1/154", "stream": "steady", "asked_age_ms": 12_000},
                 "details": {
                     "generation": "v2", "faults": ["firmware 7.8.7 reports a wrong yaw from North"],
                     "parameters": {"RC_TYPE": 7.0},
@@ -78,7 +79,7 @@ fn status_is_the_whole_snapshot() {
                 },
                 "setpoint": null, "primary": null, "secondary": null, "primary_age_ms": null, "secondary_age_ms": null,
                 "lender": null, "takeover": "open", "roi": null,
-                "flags": [], "failure_flags": [], "rejected": {},
+                "flags": [], "failure_flags": [], "rejected": {}, "presented": null,
                 "details": {"generation": null, "faults": [], "parameters": {}},
             },
         ],

@@ -140,6 +140,11 @@ impl GimbalManager {
         &self.identity
     }
 
+    /// What the device can do, once it is known.
+    pub fn capabilities(&self) -> Option<&Capabilities> {
+        self.capabilities.as_ref()
+    }
+
     /// Whether enough is known of the device to steer it.
     pub fn is_known(&self) -> bool {
         self.capabilities.is_some()

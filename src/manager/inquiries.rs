@@ -26,12 +26,12 @@ impl GimbalManager {
     ) -> Result<Outcome, Refusal> {
         let to_everybody = command.param(7) == Some(TO_EVERYBODY);
         let not_yet = Refusal::later("no_gimbal_yet");
-        let message = match message_id(command, 1) {
+        let message = match command.message_id(1) {
             Some(message::GIMBAL_MANAGER_INFORMATION) => self.information(now, around).ok_or(not_yet)?,
             Some(message::GIMBAL_MANAGER_STATUS) => self.status_message(now).ok_or(not_yet)?,
             Some(message::COMPONENT_INFORMATION_BASIC) => Box::new(messages::component_information_basic(now)),
             Some(message::MESSAGE_INTERVAL) => {
-                let id = message_id(command, 2).unwrap_or(u32::MAX);
+                let id = command.message_id(2).unwrap_or(u32::MAX);
                 Box::new(self.message_interval(sender, id))
             }
             Some(message::GIMBAL_DEVICE_INFORMATION) if self.voice.is_some() => {
@@ -62,7 +62,7 @@ impl GimbalManager {
         command: &Command,
     ) -> Result<Outcome, Refusal> {
         let micros = command.param(2).unwrap_or(0.0);
-        let schedule = match (message_id(command, 1), &mut self.voice) {
+        let schedule = match (command.message_id(1), &mut self.voice) {
             (Some(message::GIMBAL_MANAGER_STATUS), _) => &mut self.status_schedule,
             (Some(message::GIMBAL_MANAGER_INFORMATION), _) => &mut self.information_schedule,
             (Some(message::GIMBAL_DEVICE_ATTITUDE_STATUS), Some(voice)) => &mut voice.schedule,
@@ -74,7 +74,7 @@ impl GimbalManager {
     }
 
     pub(super) fn get_message_interval(&mut self, sender: Sender, command: &Command) -> Outcome {
-        let id = message_id(command, 1).unwrap_or(u32::MAX);
+        let id = command.message_id(1).unwrap_or(u32::MAX);
         let interval = self.message_interval(sender, id);
         if !command.is_directed() && interval == messages::message_interval(id, Interval::NotAvailable) {
             return Outcome::Ignored;
@@ -105,10 +105,4 @@ fn not_ours(command: &Command, message_id: Option<u32>) -> Result<Outcome, Refus
         Some(message::HEARTBEAT) => "heartbeat_is_fixed",
         _ => "unknown_message",
     }))
-}
-
-/// A parameter that is a message id; `None` where it can be none.
-fn message_id(command: &Command, number: usize) -> Option<u32> {
-    let id = command.param(number)?;
-    (id.fract() == 0.0 && (0.0..16_777_216.0).contains(&id)).then_some(id as u32)
 }

@@ -54,6 +54,7 @@ impl GimbalManager {
     pub(super) fn note_demand(&mut self, now: Timestamp, sender: MavId) {
         self.source_heard = now;
         self.paused_by = None;
+        self.autopilot_client.handle_obeyed(now, sender);
         if self.control.primary() == Some(sender) {
             self.primary_demand = Some(now);
         }
@@ -72,6 +73,7 @@ impl GimbalManager {
         self.configure(now, sender, Configure::read(command)?, around)
     }
 
+    /// Applies what `sender` claims, and tells of it.
     pub(super) fn configure(
         &mut self,
         now: Timestamp,
@@ -102,6 +104,7 @@ impl GimbalManager {
             return;
         }
         self.last_command = None;
+        self.autopilot_client.handle_changes_of_control(now, changes);
         let holders = [self.control.primary(), self.control.secondary()];
         let source = self.tracking.source();
         let source_lost_its_place =

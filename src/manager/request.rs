@@ -2,8 +2,8 @@
 
 use crate::geometry::{Angle, AngularRate, Attitude, EarthFrame, GimbalAngles};
 use crate::wire::dialect::{
-    COMMAND_INT_DATA, COMMAND_LONG_DATA, GIMBAL_MANAGER_SET_ATTITUDE_DATA, GIMBAL_MANAGER_SET_MANUAL_CONTROL_DATA,
-    GIMBAL_MANAGER_SET_PITCHYAW_DATA,
+    COMMAND_INT_DATA, COMMAND_LONG_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA, GIMBAL_MANAGER_SET_ATTITUDE_DATA,
+    GIMBAL_MANAGER_SET_MANUAL_CONTROL_DATA, GIMBAL_MANAGER_SET_PITCHYAW_DATA,
 };
 use crate::wire::ids::{CommandResult, GimbalFlags, command, message};
 use crate::wire::{Frame, MavId, Target};
@@ -157,6 +157,33 @@ fn set_attitude(target: Target, message: &GIMBAL_MANAGER_SET_ATTITUDE_DATA) -> R
     })
 }
 
+/// `GIMBAL_DEVICE_SET_ATTITUDE` (284): what an autopilot tells a device. `None` where it demands nothing.
+///
+/// Whoever states an angle means no rate, except that PX4 sends the identity beside one.
+pub fn device_set_attitude(message: &GIMBAL_DEVICE_SET_ATTITUDE_DATA) -> Result<Option<Demand>, Refusal> {
+    let attitude: Option<Attitude<EarthFrame>> =
+        Attitude::from_wxyz(message.q).map_err(|_| Refusal::denied("malformed_quaternion"))?;
+    let [roll_rate, pitch_rate, yaw_rate] =
+        [rate(message.angular_velocity_x)?, rate(message.angular_velocity_y)?, rate(message.angular_velocity_z)?];
+    let turns = [roll_rate, pitch_rate, yaw_rate].iter().flatten().any(|rate| !rate.is_zero());
+    let angles = attitude.filter(|_| !(turns && message.q == [1.0, 0.0, 0.0, 0.0])).map(Attitude::gimbal_angles);
+    let axis = |of: fn(GimbalAngles) -> Angle, rate: Option<AngularRate>| match angles {
+        Some(angles) => AxisDemand { angle: Some(of(angles)), rate: None },
+        None => AxisDemand { angle: None, rate },
+    };
+    let demand = Demand {
+        flags: GimbalFlags::from_bits_retain(message.flags),
+        roll: axis(|angles| angles.roll, roll_rate),
+        pitch: axis(|angles| angles.pitch, pitch_rate),
+        yaw: axis(|angles| angles.yaw, yaw_rate),
+        kind: DemandKind::Streamed,
+    };
+    check(&demand)?;
+    let poses = demand.flags.intersects(GimbalFlags::RETRACT | GimbalFlags::NEUTRAL);
+    let is_empty = [demand.roll, demand.pitch, demand.yaw].iter().all(|axis| *axis == AxisDemand::default());
+    Ok(Some(demand).filter(|_| poses || !is_empty))
+}
+
 /// `GIMBAL_MANAGER_SET_PITCHYAW` (287), in radians.
 fn set_pitchyaw(target: Target, message: &GIMBAL_MANAGER_SET_PITCHYAW_DATA) -> Result<Request, Refusal> {
     Ok(Request::Demand {
@@ -239,6 +266,14 @@ fn check(demand: &Demand) -> Result<(), Refusal> {
     Ok(())
 }
 
+impl Demand {
+    /// Whether it asks the gimbal to turn on and on.
+    pub fn turns(&self) -> bool {
+        let axes = [self.roll, self.pitch, self.yaw];
+        axes.iter().any(|axis| axis.angle.is_none() && axis.rate.is_some_and(|rate| !rate.is_zero()))
+    }
+}
+
 impl Command {
     /// Parameter `number`, 1 to 7, `None` when it is NaN.
     pub fn param(&self, number: usize) -> Option<f32> {
@@ -248,6 +283,12 @@ impl Command {
     /// Whether the command names exactly one component.
     pub fn is_directed(&self) -> bool {
         matches!(self.target, Target::Component(_))
+    }
+
+    /// A parameter that is a message id; `None` where it can be none.
+    pub fn message_id(&self, number: usize) -> Option<u32> {
+        let id = self.param(number)?;
+        (id.fract() == 0.0 && (0.0..16_777_216.0).contains(&id)).then_some(id as u32)
     }
 
     /// A parameter that is a device id: NaN and 0 mean every gimbal of the component.
@@ -268,6 +309,12 @@ impl Command {
     /// `COMMAND_INT`, which counts no confirmations, nobody can tell.
     pub fn is_meant_again_after(&self, earlier: &Self) -> bool {
         self.form == Form::Long && self.confirmation == 0 && self.says_what(earlier)
+    }
+
+    /// Whether both name the same place in the same way.
+    pub fn names_the_place_of(&self, other: &Self) -> bool {
+        let place = |command: &Self| [command.params[4], command.params[5], command.params[6]].map(f32::to_bits);
+        (self.number, self.form) == (other.number, other.form) && place(self) == place(other)
     }
 
     fn says_what(&self, other: &Self) -> bool {

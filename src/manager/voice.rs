@@ -45,6 +45,11 @@ impl DeviceVoice {
         self.latest = Some(status);
     }
 
+    /// Where the gimbal looked when it last told.
+    pub fn attitude(&self) -> Option<GimbalAttitude> {
+        self.latest.map(|status| status.attitude)
+    }
+
     /// 283.
     pub fn information(&self, now: Timestamp, identity: &Identity, capabilities: &Capabilities) -> MavMessage {
         let limits = &capabilities.limits;

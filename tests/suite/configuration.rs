@@ -89,7 +89,7 @@ lease_timeout_s = -1
         r#"c.toml:17: link.Gimbal.name: found "Gimbal", the name in line 5; expected a name that differs from all others in more than case and - or _"#,
         r#"c.toml:21: gimbal.camera.link: found "gimbl"; expected the name of a link, one of gimbal, ground, Gimbal; did you mean gimbal?"#,
         r#"c.toml:22: gimbal.camera.family: found "mavlink_v3"; expected auto, mavlink_v2 or mavlink_v1; did you mean mavlink_v2?"#,
-        "c.toml:24: htp: unknown key; expected one of vehicle, link, gimbal, control, roi, http; did you mean http?",
+        "c.toml:24: htp: unknown key; expected one of vehicle, link, gimbal, autopilot, control, roi, http; did you mean http?",
         "c.toml:27: control.lease_timeout_s: found -1; expected a number of seconds from 0.001 to 3600",
     ];
     assert_eq!(check(text, &[]), refused(&lines));
@@ -501,6 +501,19 @@ fn a_token_that_others_can_read_is_refused() {
     );
 }
 
+/// A device can be presented only to an autopilot, and only where no manager of ours has its component id.
+#[test]
+fn a_device_that_cannot_be_presented_is_a_problem() {
+    assert_refused(
+        "[autopilot]\npresent_device = true\n[[gimbal]]\nname = \"camera\"\nfamily = \"mavlink_v1\"\n\
+         manager_component_id = 154\n",
+        &[
+            "c.toml:6: autopilot.present_device: found true; expected false, or a link of role autopilot",
+            "c.toml:10: gimbal.camera.manager_component_id: found 154, which is a gimbal device's id; expected a component id from 7 to 255 that nobody else on the vehicle has, for example 195",
+        ],
+    );
+}
+
 #[test]
 fn a_wrong_variable_is_named() {
     let variables = [
@@ -515,8 +528,8 @@ fn a_wrong_variable_is_named() {
         ("GIMBALD__VEHICLE__SYSTEM_ID", "300"),
         ("GIMBALD_LOG", "no concern of ours"),
     ];
-    const KINDS: &str = "GIMBALD__SECTION__KEY with VEHICLE, CONTROL, ROI or HTTP, or GIMBALD__LINK__NAME__KEY, or \
-                         GIMBALD__GIMBAL__NAME__KEY";
+    const KINDS: &str = "GIMBALD__SECTION__KEY with VEHICLE, AUTOPILOT, CONTROL, ROI or HTTP, or \
+                         GIMBALD__LINK__NAME__KEY, or GIMBALD__GIMBAL__NAME__KEY";
     let lines = [
         r#"GIMBALD__CONTROL__FIREWALL: control.firewall: found "maybe"; expected on or warn"#,
         "GIMBALD__CONTROL__LEASE_TIMEOT_S: control.lease_timeot_s: unknown key; expected one of unclaimed, lease_timeout_s, rate_timeout_s, command_rate_timeout_s, firewall, snoop_autopilot, px4_release_quirk, synthesize_286; did you mean lease_timeout_s?",
@@ -589,6 +602,10 @@ name = "nose"
 role = "gimbal"
 endpoint = "serial:/dev/ttyUSB0:57600"
 [[link]]
+name = "autopilot"
+role = "autopilot"
+endpoint = "tcpin:127.0.0.1:5760"
+[[link]]
 name = "ground"
 role = "ground"
 endpoint = "udpbcast:10.0.0.255:14550"
@@ -607,6 +624,8 @@ manual_pitch_rate_dps = 12.5
 manual_yaw_rate_dps = 45
 [vehicle]
 system_id = 7
+[autopilot]
+present_device = true
 [control]
 unclaimed = "closed"
 lease_timeout_s = 3
@@ -633,19 +652,20 @@ fn every_key_arrives_where_it_belongs() {
         speaks_first,
         max_rates: max_rates.iter().map(|(id, millis)| (*id, Duration::from_millis(*millis))).collect(),
     };
-    let (serial, broadcast) = ("serial:/dev/ttyUSB0:57600", "udpbcast:10.0.0.255:14550");
+    let (serial, tcp, broadcast) = ("serial:/dev/ttyUSB0:57600", "tcpin:127.0.0.1:5760", "udpbcast:10.0.0.255:14550");
     let expected = DaemonSettings {
         core: Settings {
             system_id: SystemId::Fixed(7),
             stored_system_id: None,
             links: vec![
                 link("nose", Role::Gimbal, serial, Transport::Serial { baud: 57_600 }, false, &[]),
+                link("autopilot", Role::Autopilot, tcp, Transport::Stream, false, &[]),
                 link("ground", Role::Ground, broadcast, Transport::Datagrams, true, &[(281, 2000), (285, 250)]),
             ],
             gimbals: vec![GimbalSettings {
                 name: "nose-cam".to_owned(),
                 family: Family::MavlinkV2,
-                link: Some(1),
+                link: Some(2),
                 component_id: Some(171),
                 manager_component_id: Some(200),
                 takeover: Takeover::Ask,
@@ -666,8 +686,9 @@ fn every_key_arrives_where_it_belongs() {
                 synthesize_286: false,
                 roi_altitude: AltitudeReference::Amsl,
             },
+            present_device: true,
         },
-        endpoints: vec![serial.parse().expect(serial), broadcast.parse().expect(broadcast)],
+        endpoints: vec![serial.parse().expect(serial), tcp.parse().expect(tcp), broadcast.parse().expect(broadcast)],
         http: Some(HttpSettings {
             listen: "[::1]:9090".parse().expect("an address"),
             token_file: Some("/nowhere/token".into()),
@@ -684,6 +705,7 @@ fn what_is_not_said_has_its_default() {
     assert_eq!(loaded.core.system_id, SystemId::Auto);
     assert_eq!(loaded.core.gimbals, []);
     assert_eq!(loaded.core.control, ControlSettings::default());
+    assert!(!loaded.core.present_device);
     let listen = "127.0.0.1:8080".parse().expect("an address");
     assert_eq!(loaded.http, Some(HttpSettings { listen, token_file: None }));
     assert_eq!(loaded.state_directory, None);
@@ -726,6 +748,7 @@ fn variables_override_the_file() {
         ("GIMBALD__GIMBAL__NOSE_CAM__MANUAL_PITCH_RATE_DPS", "12.5"),
         ("GIMBALD__GIMBAL__NOSE_CAM__MANUAL_YAW_RATE_DPS", "45"),
         ("GIMBALD__VEHICLE__SYSTEM_ID", "7"),
+        ("GIMBALD__AUTOPILOT__PRESENT_DEVICE", "true"),
         ("GIMBALD__CONTROL__UNCLAIMED", "closed"),
         ("GIMBALD__CONTROL__LEASE_TIMEOUT_S", "3"),
         ("GIMBALD__CONTROL__RATE_TIMEOUT_S", "0.5"),
@@ -743,6 +766,10 @@ fn variables_override_the_file() {
 name = "nose"
 role = "gimbal"
 endpoint = "serial:/dev/ttyUSB0:57600"
+[[link]]
+name = "autopilot"
+role = "autopilot"
+endpoint = "tcpin:127.0.0.1:5760"
 [[link]]
 name = "ground"
 role = "peer"

@@ -9,6 +9,7 @@ mod identity;
 mod manager;
 mod mavsdk_trace;
 mod own_commands;
+mod presented_device;
 mod rivals;
 mod spoken_for;
 mod state_for_gimbals;

@@ -147,6 +147,15 @@ fn gimbal(out: &mut Lines, gimbal: &GimbalSnapshot) {
     if let Some(demand) = &gimbal.setpoint {
         out.fact("setpoint", &setpoint(demand));
     }
+    if let Some(presented) = &gimbal.presented {
+        let stream = match presented.stream.as_str() {
+            "silent" => "does not steer it".to_owned(),
+            "asks" => format!("asked for something {}", age(presented.asked_age_ms)),
+            "overruled" => "is overruled".to_owned(),
+            _ => "asks for nothing new".to_owned(),
+        };
+        out.fact("autopilot", &format!("sees it as {}, {stream}", presented.device));
+    }
     if let Some(roi) = &gimbal.roi {
         let place = place(Some(roi.latitude_deg), Some(roi.longitude_deg));
         out.fact("roi", &format!("{place}  {}", altitude(Some(roi.altitude_amsl_m))));
@@ -313,6 +322,7 @@ gimbal camera  alive  mavlink_v2  device 1/154  manager 191
   attitude  roll 0.3°  pitch -42.5°  yaw 30.0° from the nose, 117.0° from North  18 ms ago
   control   255/190 for 1 min 1 s
   setpoint  angle  pitch -45.0°  yaw 120.0° from North  by 255/190
+  autopilot sees it as 1/154, asks for nothing new
   roi       47.400000° 8.550000°  430.0 m above mean sea level
   failures  motor_error
   flags     yaw_lock roll_lock

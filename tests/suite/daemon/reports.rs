@@ -66,6 +66,7 @@ const GIMBAL: &[&str] = &[
     "flags",
     "failure_flags",
     "rejected",
+    "presented",
     "details",
 ];
 const ATTITUDE: &[&str] = &["roll_deg", "pitch_deg", "yaw_vehicle_deg", "yaw_earth_deg", "age_ms"];

@@ -5,13 +5,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The files whose comments carry the numbers of rules.
-const NUMBERED: [&str; 7] = [
+const NUMBERED: [&str; 8] = [
     "src/router/routes.rs",
     "src/router/rules.rs",
     "src/bridge/channels.rs",
     "src/bridge/delivery.rs",
     "src/bridge/firewall.rs",
     "src/bridge/pacing.rs",
+    "src/bridge/presenting.rs",
     "src/bridge/rates.rs",
 ];
 
