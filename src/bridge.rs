@@ -113,6 +113,9 @@ pub enum Output<'a> {
     Transmit { channels: ChannelSet, bytes: &'a [u8] },
     /// Keep the adopted system id for the next start.
     StoreSystemId(u8),
+    /// Keep the names of the gimbals that are told to turn, one to a line, for a start after we were killed; empty when
+    /// none is.
+    StoreTurning(&'a str),
     /// What became of something asked.
     Answered { id: OperationId, answer: &'a Answer },
 }
@@ -148,6 +151,8 @@ pub struct Bridge {
     buffer: FrameBuffer,
     timers: TimerTable<Timer>,
     shutting_down: bool,
+    /// By place in the roster, which gimbals may be turning as they were told; kept outside when it changes.
+    turning: u64,
 }
 
 /// A system that has an autopilot.
@@ -193,6 +198,7 @@ impl Bridge {
             buffer: FrameBuffer::default(),
             timers: TimerTable::default(),
             shutting_down: false,
+            turning: 0,
             identity,
             settings,
         };

@@ -25,18 +25,21 @@ pub const DEFAULT_FILE: &str = "/etc/gimbald/gimbald.toml";
 
 /// Reads the file at `path`, lays the `GIMBALD__` variables of `environment` over it, and checks the whole.
 ///
-/// `STATE_DIRECTORY`, as systemd sets it, names the state directory. Other variables are ignored.
+/// `STATE_DIRECTORY` and `RUNTIME_DIRECTORY`, as systemd sets them, name the directories for what is kept until the next
+/// start. Other variables are ignored.
 pub fn load(path: &Path, environment: impl Iterator<Item = (String, String)>) -> Result<DaemonSettings, Problems> {
     let in_file = |list| Problems::new(path.to_owned(), list);
     let text = file::read(path).map_err(|problem| in_file(vec![problem]))?;
     let mut root = document::parse(&text).map_err(|problem| in_file(vec![problem]))?;
 
     let mut problems = Vec::new();
-    let mut state_directory = None;
+    let mut directories = settings::Directories::default();
     let mut overrides = Vec::new();
     for (name, value) in environment {
         if name == "STATE_DIRECTORY" {
-            state_directory = first_directory(&value);
+            directories.state = first_directory(&value);
+        } else if name == "RUNTIME_DIRECTORY" {
+            directories.runtime = first_directory(&value);
         } else if name.starts_with(environment::PREFIX) {
             overrides.push((name, value));
         }
@@ -46,7 +49,7 @@ pub fn load(path: &Path, environment: impl Iterator<Item = (String, String)>) ->
 
     let configuration = schema::read(root, &mut problems);
     checks::check(&configuration, &mut problems);
-    if problems.is_empty() { Ok(settings::build(configuration, state_directory)) } else { Err(in_file(problems)) }
+    if problems.is_empty() { Ok(settings::build(configuration, directories)) } else { Err(in_file(problems)) }
 }
 
 /// The variables of this process; bytes that are no UTF-8 become U+FFFD, which no setting accepts.
@@ -54,7 +57,7 @@ pub fn process_environment() -> impl Iterator<Item = (String, String)> {
     std::env::vars_os().map(|(name, value)| (name.to_string_lossy().into_owned(), value.to_string_lossy().into_owned()))
 }
 
-/// `$STATE_DIRECTORY` holds the paths of all state directories with colons between them; ours is the first.
+/// Such a variable holds the paths of all directories of its kind with colons between them; ours is the first.
 fn first_directory(value: &str) -> Option<PathBuf> {
     value.split(':').next().filter(|path| !path.is_empty()).map(PathBuf::from)
 }

@@ -10,4 +10,5 @@ pub mod shutdown;
 pub mod supervisor;
 mod system_id_file;
 mod systemd;
+mod turning_file;
 pub mod window;

@@ -22,6 +22,20 @@ impl Bridge {
         self.carry_out_for_gimbals(now);
         self.answer_for_lost_gimbals(now);
         self.carry_out_own_commands(now);
+        self.note_turning();
+    }
+
+    /// Whoever is killed while a gimbal turns finds out at the next start that it is to be stopped.
+    fn note_turning(&mut self) {
+        let turning = self.roster.iter().take(64).enumerate().filter(|(_, gimbal)| gimbal.manager.may_be_turning());
+        let turning = turning.fold(0, |set, (at, _)| set | 1 << at);
+        if turning == self.turning {
+            return;
+        }
+        self.turning = turning;
+        let named = self.roster.iter().take(64).enumerate().filter(|(at, _)| turning & 1 << at != 0);
+        let names: String = named.map(|(_, gimbal)| format!("{}\n", gimbal.manager.settings().name)).collect();
+        self.outbox.push_turning(names);
     }
 
     pub(super) fn carry_out_for_gimbals(&mut self, now: Timestamp) {

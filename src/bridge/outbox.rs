@@ -12,7 +12,8 @@ use crate::manager::asked::Answer;
 pub struct Outbox {
     bytes: Vec<u8>,
     entries: VecDeque<Entry>,
-    /// The last one that was given out.
+    /// The last ones that were given out.
+    turning: String,
     answer: Answer,
 }
 
@@ -20,12 +21,13 @@ pub struct Outbox {
 enum Entry {
     Frame { channels: ChannelSet, start: usize, end: usize },
     StoreSystemId(u8),
+    StoreTurning(String),
     Answered { id: OperationId, answer: Answer },
 }
 
 impl Default for Outbox {
     fn default() -> Self {
-        Self { bytes: Vec::new(), entries: VecDeque::new(), answer: Ok(()) }
+        Self { bytes: Vec::new(), entries: VecDeque::new(), turning: String::new(), answer: Ok(()) }
     }
 }
 
@@ -46,6 +48,10 @@ impl Outbox {
         self.entries.push_back(Entry::StoreSystemId(system));
     }
 
+    pub fn push_turning(&mut self, names: String) {
+        self.entries.push_back(Entry::StoreTurning(names));
+    }
+
     pub fn push_answer(&mut self, id: OperationId, answer: Answer) {
         self.entries.push_back(Entry::Answered { id, answer });
     }
@@ -54,6 +60,10 @@ impl Outbox {
         Some(match self.entries.pop_front()? {
             Entry::Frame { channels, start, end } => Output::Transmit { channels, bytes: &self.bytes[start..end] },
             Entry::StoreSystemId(system) => Output::StoreSystemId(system),
+            Entry::StoreTurning(names) => {
+                self.turning = names;
+                Output::StoreTurning(&self.turning)
+            }
             Entry::Answered { id, answer } => {
                 self.answer = answer;
                 Output::Answered { id, answer: &self.answer }

@@ -128,6 +128,8 @@ pub enum GimbalOutput {
 pub struct Roster {
     gimbals: Vec<Gimbal>,
     rules: ControlSettings,
+    /// Gimbals that an earlier run left turning, and that were not there since.
+    left_turning: Vec<String>,
     /// The channels that are open, for the manager of a gimbal that is found later.
     open: ChannelSet,
     /// Devices that are not adopted yet, and when each was first heard.
@@ -141,6 +143,7 @@ impl Roster {
         let mut roster = Self {
             gimbals: Vec::new(),
             rules: settings.control.clone(),
+            left_turning: settings.left_turning.clone(),
             open: ChannelSet::EMPTY,
             waiting: Vec::new(),
             self_managed: Vec::new(),
@@ -166,6 +169,9 @@ impl Roster {
             roster.gimbals.push(Gimbal::new(gimbal.clone(), &settings.control, component, true, number));
         }
         roster.ensure_first_manager();
+        for at in 0..roster.gimbals.len() {
+            roster.stop_if_left_turning(at);
+        }
         roster
     }
 
@@ -265,7 +271,17 @@ impl Roster {
             gimbal.manager.open_channel(now, channel);
         }
         self.gimbals.insert(at, gimbal);
+        self.stop_if_left_turning(at);
         Ok(at)
+    }
+
+    fn stop_if_left_turning(&mut self, at: usize) {
+        let manager = &mut self.gimbals[at].manager;
+        let name = &manager.settings().name;
+        if let Some(left) = self.left_turning.iter().position(|turning| turning == name) {
+            self.left_turning.swap_remove(left);
+            manager.stop_when_heard();
+        }
     }
 
     /// A name that no gimbal has: by the component, with the system where that is not the vehicle's.

@@ -13,7 +13,7 @@ use tokio::sync::oneshot;
 
 use crate::bridge::settings::{Role, Settings};
 use crate::cli::{DemoArgs, SimulatedFamily};
-use crate::config::settings::{DaemonSettings, HttpSettings, link_on};
+use crate::config::settings::{DaemonSettings, Directories, HttpSettings, link_on};
 use crate::daemon::clock::unix_time_us;
 use crate::daemon::supervisor;
 use crate::endpoint::Endpoint;
@@ -121,7 +121,7 @@ fn daemon_settings(arguments: &DemoArgs, gimbal: Endpoint, autopilot: SocketAddr
         endpoints: all.into_iter().map(|(_, _, endpoint)| endpoint).collect(),
         http: Some(HttpSettings { listen: arguments.http, token_file: None }),
         // A simulated vehicle's id is not worth keeping.
-        state_directory: None,
+        directories: Directories::default(),
     }
 }
 

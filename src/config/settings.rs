@@ -19,8 +19,16 @@ pub struct DaemonSettings {
     /// One for each link of `core`, in the same order.
     pub endpoints: Vec<Endpoint>,
     pub http: Option<HttpSettings>,
-    /// Where the adopted system id is kept; nowhere when unset.
-    pub state_directory: Option<PathBuf>,
+    pub directories: Directories,
+}
+
+/// Where something is kept from one start to the next; nowhere when unset.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Directories {
+    /// The adopted system id, for good.
+    pub state: Option<PathBuf>,
+    /// Which gimbals were told to turn, until the next boot.
+    pub runtime: Option<PathBuf>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -36,7 +44,7 @@ impl HttpSettings {
 }
 
 /// Turns a configuration without problems into settings; unset keys get their defaults here.
-pub(super) fn build(configuration: Configuration, state_directory: Option<PathBuf>) -> DaemonSettings {
+pub(super) fn build(configuration: Configuration, directories: Directories) -> DaemonSettings {
     let Configuration { vehicle, links, gimbals, autopilot, control, roi, http } = configuration;
     let (links, endpoints): (Vec<LinkSettings>, Vec<Endpoint>) = links.into_iter().map(link).unzip();
     let gimbals = gimbals.into_iter().map(|entry| gimbal(entry, &links)).collect();
@@ -44,6 +52,7 @@ pub(super) fn build(configuration: Configuration, state_directory: Option<PathBu
         core: Settings {
             system_id: value_or(vehicle.system_id, Settings::default().system_id),
             stored_system_id: None,
+            left_turning: Vec::new(),
             links,
             gimbals,
             control: self::control(control, roi),
@@ -51,7 +60,7 @@ pub(super) fn build(configuration: Configuration, state_directory: Option<PathBu
         },
         endpoints,
         http: Some(self::http(http)),
-        state_directory,
+        directories,
     }
 }
 

@@ -16,6 +16,7 @@ use super::clock::{Clock, DeadlineTimer};
 use super::shutdown::Shutdown;
 use super::system_id_file::SystemIdFile;
 use super::systemd::ServiceManager;
+use super::turning_file::TurningFile;
 use super::window::CoreRequest;
 use crate::bridge::snapshot::Snapshot;
 use crate::bridge::{Bridge, Input, LinkIndex, Output};
@@ -49,8 +50,14 @@ struct Ports {
     links: Vec<Box<dyn Link>>,
     channels: ChannelTable,
     states: Vec<LinkState>,
-    system_id_file: SystemIdFile,
+    kept: Kept,
     askers: Askers,
+}
+
+/// What is kept for the next start.
+pub struct Kept {
+    pub system_id: SystemIdFile,
+    pub turning: TurningFile,
 }
 
 /// What is known of a link, so that only changes are told.
@@ -77,13 +84,13 @@ impl EventLoop {
         timer: DeadlineTimer,
         shutdown: Shutdown,
         service_manager: ServiceManager,
-        system_id_file: SystemIdFile,
+        kept: Kept,
         window: Window,
     ) -> Self {
         let channels = ChannelTable::new(links.len());
         let states =
             names.into_iter().map(|name| LinkState { name, state: State::Unknown, refusal_told: false }).collect();
-        let ports = Ports { links, channels, states, system_id_file, askers: Askers::default() };
+        let ports = Ports { links, channels, states, kept, askers: Askers::default() };
         let inbox = Inbox::default();
         Self { clock, timer, core, ports, inbox, shutdown, service_manager, window, started: false }
     }
@@ -197,7 +204,8 @@ impl Ports {
                         self.links[link].send(peers, bytes);
                     }
                 }
-                Output::StoreSystemId(id) => self.system_id_file.store(id),
+                Output::StoreSystemId(id) => self.kept.system_id.store(id),
+                Output::StoreTurning(names) => self.kept.turning.store(names),
                 Output::Answered { id, answer } => self.askers.answer(id, answer.clone()),
             }
         }
@@ -304,7 +312,7 @@ mod tests {
                     DeadlineTimer::new().expect("a timer"),
                     Shutdown::new().expect("signals can be caught"),
                     ServiceManager::new(),
-                    SystemIdFile::new(None),
+                    Kept { system_id: SystemIdFile::new(None), turning: TurningFile::new(None) },
                     window,
                 );
                 poll_fn(|cx| {

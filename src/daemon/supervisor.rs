@@ -7,10 +7,11 @@ use std::sync::Arc;
 use tokio::sync::{mpsc, watch};
 
 use super::clock::{Clock, DeadlineTimer};
-use super::event_loop::{EventLoop, REQUESTS, Window};
+use super::event_loop::{EventLoop, Kept, REQUESTS, Window};
 use super::shutdown::Shutdown;
 use super::system_id_file::SystemIdFile;
 use super::systemd::ServiceManager;
+use super::turning_file::TurningFile;
 use super::window::CoreHandle;
 use crate::bridge::Bridge;
 use crate::config::settings::DaemonSettings;
@@ -47,9 +48,11 @@ fn assemble(settings: DaemonSettings) -> Result<EventLoop, RunError> {
     let timer = DeadlineTimer::new().map_err(RunError::Timer)?;
     let clock = Clock::start();
 
-    let system_id_file = SystemIdFile::new(settings.state_directory);
+    let system_id_file = SystemIdFile::new(settings.directories.state);
+    let turning_file = TurningFile::new(settings.directories.runtime);
     let mut core_settings = settings.core;
     core_settings.stored_system_id = core_settings.stored_system_id.or_else(|| system_id_file.read());
+    core_settings.left_turning.append(&mut turning_file.read());
     let names = core_settings.links.iter().map(|link| link.name.clone()).collect();
     let core = Bridge::new(clock.now(), core_settings);
 
@@ -62,5 +65,6 @@ fn assemble(settings: DaemonSettings) -> Result<EventLoop, RunError> {
 
     let links = settings.endpoints.iter().map(links::link).collect();
     let window = Window { requests: received_requests, snapshots: published };
-    Ok(EventLoop::new(core, links, names, clock, timer, shutdown, ServiceManager::new(), system_id_file, window))
+    let kept = Kept { system_id: system_id_file, turning: turning_file };
+    Ok(EventLoop::new(core, links, names, clock, timer, shutdown, ServiceManager::new(), kept, window))
 }

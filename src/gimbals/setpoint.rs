@@ -60,6 +60,15 @@ pub enum RadioControl {
 }
 
 impl Turning {
+    pub const STOPPED: Self = Self {
+        roll: None,
+        pitch: AngularRate::ZERO,
+        yaw: AngularRate::ZERO,
+        yaw_frame: YawFrame::Vehicle,
+        stabilised: Stabilised::BOTH,
+        radio_control: RadioControl::Off,
+    };
+
     pub fn is_zero(&self) -> bool {
         [self.roll.unwrap_or(AngularRate::ZERO), self.pitch, self.yaw].iter().all(|rate| rate.is_zero())
     }

@@ -7,7 +7,7 @@ use super::voice::DeviceVoice;
 use super::{DeviceState, GimbalManager, ManagerOutput, Surroundings};
 use crate::gimbals::capabilities::Capabilities;
 use crate::gimbals::report::{GimbalStatus, Identity, Report};
-use crate::gimbals::setpoint::Setpoint;
+use crate::gimbals::setpoint::{Setpoint, Turning};
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 use crate::wire::ids::{CommandResult, FailureFlags};
@@ -33,6 +33,9 @@ impl GimbalManager {
                 self.tell(Event::Restarted { device: self.device });
             }
             Report::Alive { device } => {
+                if self.device.is_some_and(|before| before != device) {
+                    self.unstopped = None;
+                }
                 if self.device != Some(device) {
                     self.tracking.forget();
                     self.heading_bias = HeadingBias::default();
@@ -40,20 +43,18 @@ impl GimbalManager {
                     self.capabilities = None;
                     self.status = None;
                     self.told_attitude = None;
-                    self.unstopped = None;
-                }
-                if let Some(turning) = self.unstopped.take() {
-                    self.tracking.halt(now, turning);
                 }
                 let known = self.device.replace(device) == Some(device);
                 self.state = DeviceState::Alive;
                 self.tell(if known { Event::Back { device } } else { Event::Found { device } });
+                self.stop_what_was_left_turning(now);
             }
             Report::SpeaksForItself(itself) => self.speak_for_device(now, !itself),
             Report::Known(identity, capabilities) => {
                 let changed = self.identity != identity || self.capabilities != Some(capabilities);
                 self.identity = identity;
                 self.capabilities = Some(capabilities);
+                self.stop_what_was_left_turning(now);
                 if changed {
                     let (vendor, model) = (&self.identity.vendor, &self.identity.model);
                     tracing::info!(gimbal = self.settings.name, vendor, model, "gimbal known");
@@ -92,6 +93,25 @@ impl GimbalManager {
             }
         }
         self.carry_out(now, around);
+    }
+
+    /// An earlier run left the gimbal turning: it is told to stop when it is heard.
+    pub fn stop_when_heard(&mut self) {
+        self.unstopped = Some(Turning::STOPPED);
+    }
+
+    /// Nobody can be told what to do before it is known.
+    fn stop_what_was_left_turning(&mut self, now: Timestamp) {
+        if self.capabilities.is_some()
+            && let Some(turning) = self.unstopped.take()
+        {
+            self.tracking.halt(now, turning);
+        }
+    }
+
+    /// Whether the gimbal was told to turn, and not to stop since.
+    pub fn may_be_turning(&self) -> bool {
+        self.unstopped.is_some() || self.tracking.unstopped().is_some()
     }
 
     /// From now on speaks for the gimbal, or leaves that to the gimbal itself.

@@ -10,7 +10,7 @@ use nix::sys::stat::Mode;
 use nix::unistd::mkfifo;
 
 use gimbald::bridge::settings::{LinkSettings, Role, Settings, SystemId, Transport};
-use gimbald::config::settings::{DaemonSettings, HttpSettings};
+use gimbald::config::settings::{DaemonSettings, Directories, HttpSettings};
 use gimbald::config::{self, problem::Problems};
 use gimbald::gimbals::mavlink_v1::packet::Signs;
 use gimbald::gimbals::settings::{DeviceYawFrame, Family, GimbalSettings, Takeover};
@@ -657,6 +657,7 @@ fn every_key_arrives_where_it_belongs() {
         core: Settings {
             system_id: SystemId::Fixed(7),
             stored_system_id: None,
+            left_turning: Vec::new(),
             links: vec![
                 link("nose", Role::Gimbal, serial, Transport::Serial { baud: 57_600 }, false, &[]),
                 link("autopilot", Role::Autopilot, tcp, Transport::Stream, false, &[]),
@@ -693,9 +694,15 @@ fn every_key_arrives_where_it_belongs() {
             listen: "[::1]:9090".parse().expect("an address"),
             token_file: Some("/nowhere/token".into()),
         }),
-        state_directory: Some("/var/lib/gimbald".into()),
+        directories: Directories { state: Some("/var/lib/gimbald".into()), runtime: Some("/run/gimbald".into()) },
     };
-    assert_eq!(load(EVERY_KEY, &[("STATE_DIRECTORY", "/var/lib/gimbald:/var/lib/other")]), Ok(expected));
+    assert_eq!(
+        load(
+            EVERY_KEY,
+            &[("STATE_DIRECTORY", "/var/lib/gimbald:/var/lib/other"), ("RUNTIME_DIRECTORY", "/run/gimbald")]
+        ),
+        Ok(expected)
+    );
 }
 
 #[test]
@@ -708,7 +715,7 @@ fn what_is_not_said_has_its_default() {
     assert!(!loaded.core.present_device);
     let listen = "127.0.0.1:8080".parse().expect("an address");
     assert_eq!(loaded.http, Some(HttpSettings { listen, token_file: None }));
-    assert_eq!(loaded.state_directory, None);
+    assert_eq!(loaded.directories, Directories::default());
 
     let loaded = load(&format!("{LINK}[[gimbal]]\nname = \"camera\"\n"), &[]).expect("a right file");
     assert_eq!(loaded.core.gimbals, [GimbalSettings::found("camera".to_owned())]);

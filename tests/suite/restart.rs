@@ -194,3 +194,43 @@ fn assert_same(found: (f64, f64), wanted: (f64, f64), within: f64) {
     let is_same = (found.0 - wanted.0).abs() <= within && (found.1 - wanted.1).abs() <= within;
     assert!(is_same, "{found:?} instead of {wanted:?}");
 }
+
+/// "A gimbal that keeps turning after its operator is gone is our worst bug", also when it is us who are gone: the names
+/// of those that turn are kept outside, and the next life stops them before anything else, and keeps them where they
+/// come to rest.
+#[test]
+fn a_gimbal_that_was_left_turning_is_stopped_by_the_next_life() {
+    let mut flight = Flight::after_a_kill(Doing::Turning);
+    assert_eq!(flight.world.stored_turning, ["gimbal-154"]);
+    let left_turning = flight.world.stored_turning.clone();
+
+    flight.world.start(Settings { left_turning, ..settings(Some(SYSTEM)) });
+    while !flight.is_known() {
+        flight.world.run_for(Duration::from_millis(1));
+    }
+    flight.world.run_for(Duration::from_millis(8));
+
+    let setpoints: Vec<GIMBAL_DEVICE_SET_ATTITUDE_DATA> = flight.world.take_messages(flight.places.gimbal);
+    let rates: Vec<_> = setpoints.iter().map(|told| [told.angular_velocity_y, told.angular_velocity_z]).collect();
+    assert_eq!(rates, [[0.0, 0.0]], "as soon as it is known");
+    assert!(setpoints[0].q.iter().all(|q| q.is_nan()), "and to go nowhere");
+    assert_eq!(flight.world.stored_turning, Vec::<String>::new());
+    let before = flight.pose_deg();
+    flight.beat_for(5);
+    assert_same(flight.pose_deg(), before, 0.3);
+    assert_eq!(flight.world.snapshot().gimbals[0].primary, None, "nobody holds it");
+}
+
+/// D9: what did not turn is told nothing at the next start; who asked for a rotation that ended is not remembered either.
+#[test]
+fn who_turns_is_kept_from_the_first_rate_to_the_last_zero() {
+    let mut flight = Flight::after_a_kill(Doing::HoldingAnAngle);
+    assert_eq!(flight.world.stored_turning, Vec::<String>::new());
+    flight.world.start(settings(Some(SYSTEM)));
+    flight.beat_for(3);
+    assert_eq!(flight.demand(&[NAN, NAN, 0.0, 20.0, 44.0]), Some(ACCEPTED));
+    assert_eq!(flight.world.stored_turning, ["gimbal-154"]);
+    assert_eq!(flight.demand(&[NAN, NAN, 0.0, 0.0, 44.0]), Some(ACCEPTED));
+    flight.beat_for(1);
+    assert_eq!(flight.world.stored_turning, Vec::<String>::new());
+}

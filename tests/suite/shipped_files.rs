@@ -181,6 +181,8 @@ fn the_unit_says_what_the_daemon_relies_on() {
         "Group=gimbald",
         "SupplementaryGroups=dialout",
         "StateDirectory=gimbald",
+        "RuntimeDirectory=gimbald",
+        "RuntimeDirectoryPreserve=restart",
         "CPUSchedulingPolicy=fifo",
         "CPUSchedulingResetOnFork=yes",
         "RestrictAddressFamilies=AF_INET AF_INET6 AF_UNIX",

@@ -3,8 +3,7 @@
 use std::time::Duration;
 
 use gimbald::wire::MavId;
-use gimbald::wire::dialect::{COMMAND_ACK_DATA, COMMAND_LONG_DATA, MavMessage};
-use gimbald::wire::ids::message;
+use gimbald::wire::dialect::{COMMAND_ACK_DATA, COMMAND_LONG_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA, MavMessage};
 use nix::sys::signal::Signal;
 
 use super::simulated_gimbal;
@@ -23,9 +22,9 @@ fn after_a_kill_the_gimbal_is_there_again_and_has_not_moved() {
     kill_and_restart(false);
 }
 
-/// The same while a rate runs, which the gimbal itself ends.
+/// The same while a rate runs: the next life stops it, and tells it nothing else.
 #[test]
-fn after_a_kill_a_gimbal_that_turned_is_not_turned_on() {
+fn after_a_kill_a_gimbal_that_turned_is_stopped() {
     kill_and_restart(true);
 }
 
@@ -39,7 +38,7 @@ fn kill_and_restart(turning: bool) {
         link("ground", "ground", "udpin:{ip}:14550"),
     ]
     .concat();
-    let variables = [("STATE_DIRECTORY", "{dir}")];
+    let variables = [("STATE_DIRECTORY", "{dir}"), ("RUNTIME_DIRECTORY", "{dir}")];
     if turning {
         // Not the first flight: there is no window to wait for.
         std::fs::write(site.path("system-id"), "42\n").expect("a writable folder");
@@ -72,6 +71,7 @@ fn kill_and_restart(turning: bool) {
         is_there.then_some(())
     });
 
+    assert_eq!(site.path("turning").exists(), turning);
     daemon.signal(Signal::SIGKILL);
     daemon.wait();
     ground.hear_now();
@@ -91,7 +91,15 @@ fn kill_and_restart(turning: bool) {
     ground.hear_for(Duration::from_millis(500));
     let told = gimbal.take_heard();
     assert!(told.iter().any(|heard| heard.source == MANAGER), "it hears us");
-    assert!(told.iter().all(|heard| heard.id != message::GIMBAL_DEVICE_SET_ATTITUDE), "and nothing moves it");
+    let rates: Vec<[f32; 2]> = told
+        .iter()
+        .filter_map(Heard::decode::<GIMBAL_DEVICE_SET_ATTITUDE_DATA>)
+        .map(|told| [told.angular_velocity_y, told.angular_velocity_z])
+        .collect();
+    // Once at rest it is kept there.
+    assert!(rates.iter().all(|rates| rates.iter().all(|rate| *rate == 0.0 || rate.is_nan())), "{rates:?}");
+    assert_eq!(rates.first(), turning.then_some(&[0.0, 0.0]), "stopped if it turned");
+    assert!(!site.path("turning").exists(), "and that is not to be done again");
     let after = pose();
     assert!((after.0 - before.0).abs() < 0.1 && (after.1 - before.1).abs() < 0.1, "{before:?} {after:?}");
 

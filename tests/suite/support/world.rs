@@ -72,6 +72,8 @@ pub struct World {
     is_running: bool,
     ends: Vec<End>,
     pub stored_system_ids: Vec<u8>,
+    /// The gimbals that were told to turn, by name.
+    pub stored_turning: Vec<String>,
     /// What became of what was asked of gimbals by name.
     pub answers: Vec<(OperationId, Answer)>,
 }
@@ -88,6 +90,7 @@ impl World {
             is_running: true,
             ends: Vec::new(),
             stored_system_ids: Vec::new(),
+            stored_turning: Vec::new(),
             answers: Vec::new(),
         };
         let mut places = Vec::new();
@@ -294,6 +297,10 @@ impl World {
                 Output::Transmit { channels, bytes } => (channels, bytes.to_vec()),
                 Output::StoreSystemId(system) => {
                     self.stored_system_ids.push(system);
+                    continue;
+                }
+                Output::StoreTurning(names) => {
+                    self.stored_turning = names.lines().map(str::to_owned).collect();
                     continue;
                 }
                 Output::Answered { id, answer } => {

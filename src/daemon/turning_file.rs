@@ -1,0 +1,73 @@
+//! Which gimbals were told to turn, kept from one start to the next: whoever is killed cannot stop them.
+
+use std::fs;
+use std::io;
+use std::path::PathBuf;
+
+const NAME: &str = "turning";
+
+/// A file of names in the runtime directory, which is in memory and outlives a restart; nothing is kept without that
+/// directory. It is written when a rotation starts or ends, on the way to the gimbal, which costs a few dozen microseconds.
+#[derive(Debug)]
+pub struct TurningFile {
+    directory: Option<PathBuf>,
+}
+
+impl TurningFile {
+    pub fn new(directory: Option<PathBuf>) -> Self {
+        Self { directory }
+    }
+
+    /// The gimbals that an earlier run left turning.
+    pub fn read(&self) -> Vec<String> {
+        let Some(path) = self.path() else { return Vec::new() };
+        match fs::read_to_string(&path) {
+            Ok(text) => text.lines().filter(|name| !name.is_empty()).map(str::to_owned).collect(),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
+            Err(error) => {
+                tracing::warn!(path = %path.display(), %error, "whether a gimbal was left turning cannot be read");
+                Vec::new()
+            }
+        }
+    }
+
+    /// Replaces what was kept; `names` stand one to a line.
+    pub fn store(&self, names: &str) {
+        let Some(path) = self.path() else { return };
+        let stored = if names.is_empty() { fs::remove_file(&path) } else { fs::write(&path, names) };
+        match stored {
+            Ok(()) => {}
+            Err(error) if names.is_empty() && error.kind() == io::ErrorKind::NotFound => {}
+            Err(error) => tracing::error!(path = %path.display(), %error, "that a gimbal turns cannot be kept"),
+        }
+    }
+
+    fn path(&self) -> Option<PathBuf> {
+        self.directory.as_ref().map(|directory| directory.join(NAME))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_turns_is_read_at_the_next_start_and_nobody_after_all_stopped() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let file = TurningFile::new(Some(directory.path().to_owned()));
+        assert_eq!(file.read(), Vec::<String>::new());
+        file.store("camera\ngimbal-171\n");
+        assert_eq!(TurningFile::new(Some(directory.path().to_owned())).read(), ["camera", "gimbal-171"]);
+        file.store("");
+        file.store("");
+        assert_eq!(file.read(), Vec::<String>::new());
+        assert_eq!(fs::read_dir(directory.path()).expect("it is there").count(), 0);
+    }
+
+    #[test]
+    fn without_a_directory_nothing_is_kept() {
+        let file = TurningFile::new(None);
+        file.store("camera\n");
+        assert_eq!(file.read(), Vec::<String>::new());
+    }
+}
