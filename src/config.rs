@@ -13,6 +13,7 @@ pub mod problem;
 mod reader;
 pub mod schema;
 pub mod settings;
+mod signs;
 mod suggestion;
 
 use std::path::{Path, PathBuf};

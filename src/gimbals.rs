@@ -14,5 +14,6 @@ pub mod parameters;
 pub mod report;
 pub mod setpoint;
 pub mod settings;
+pub mod signs;
 
 pub use driver::{CommandOutcome, DriverOutput, GimbalDriver};

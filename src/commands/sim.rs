@@ -12,8 +12,8 @@ use crate::endpoint::Endpoint;
 use crate::exit_code::ExitCode;
 use crate::geometry::{Angle, AngularRate, AxisLimits, Limits};
 use crate::gimbals::mavlink_v1;
-use crate::gimbals::mavlink_v1::packet::Signs;
 use crate::gimbals::mavlink_v2::sim::{Device, DeviceSettings, StatusFrame, Strictness, SystemId};
+use crate::gimbals::signs::Signs;
 use crate::links;
 use crate::sim::faults::{Faults, FaultyPeer};
 use crate::sim::host;
@@ -60,7 +60,7 @@ fn v1_settings(arguments: &SimGimbalArgs) -> mavlink_v1::sim::DeviceSettings {
     mavlink_v1::sim::DeviceSettings {
         component_id: arguments.component_id,
         system_id: SystemId::Fixed(arguments.system_id),
-        signs: if arguments.v1_reversed { Signs::Reversed } else { Signs::Normal },
+        signs: if arguments.v1_reversed { Signs::REVERSED } else { Signs::NORMAL },
         feedback: match arguments.v1_reports {
             SimulatedReports::Orientation => Feedback::Orientation,
             SimulatedReports::Status => Feedback::Status,

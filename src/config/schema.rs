@@ -8,13 +8,15 @@ use std::time::Duration;
 
 use crate::bridge::settings::{Role, SystemId};
 use crate::endpoint::{Endpoint, EndpointError};
-use crate::gimbals::mavlink_v1::packet::Signs;
+use crate::gimbals::mavlink_v1::config::V1RadioControl;
 use crate::gimbals::settings::{DeviceYawFrame, Family, Takeover};
+use crate::gimbals::signs::Signs;
 use crate::manager::settings::{AltitudeReference, Firewall};
 
 use super::document::{Raw, Table, Value};
 use super::problem::{Place, Problem};
 use super::reader::{Expected, Located, Section, bare, flag, is_name, number, text, whole, word};
+use super::signs::signs;
 use super::suggestion;
 
 const ROLES: &[(&str, Role)] = &[
@@ -36,7 +38,11 @@ const TAKEOVERS: &[(&str, Takeover)] = &[
 ];
 const YAW_FRAMES: &[(&str, DeviceYawFrame)] =
     &[("auto", DeviceYawFrame::Auto), ("vehicle", DeviceYawFrame::Vehicle), ("earth", DeviceYawFrame::Earth)];
-const SIGNS: &[(&str, Signs)] = &[("normal", Signs::Normal), ("reversed", Signs::Reversed)];
+const V1_RADIO_CONTROLS: &[(&str, V1RadioControl)] = &[
+    (V1RadioControl::None.name(), V1RadioControl::None),
+    (V1RadioControl::Silence.name(), V1RadioControl::Silence),
+    (V1RadioControl::Mode.name(), V1RadioControl::Mode),
+];
 const UNCLAIMED: &[(&str, bool)] = &[("open", true), ("closed", false)];
 const FIREWALLS: &[(&str, Firewall)] = &[("on", Firewall::On), ("warn", Firewall::Warn)];
 const SYNTHESIS: &[(&str, bool)] = &[("auto", true), ("off", false)];
@@ -88,6 +94,9 @@ pub(super) struct Gimbal {
     pub setpoint_rate_hz: Option<Located<u8>>,
     pub device_yaw_frame: Option<Located<DeviceYawFrame>>,
     pub v1_sign: Option<Located<Signs>>,
+    pub v1_report_sign: Option<Located<Signs>>,
+    pub v1_configure: Option<Located<bool>>,
+    pub v1_radio_control: Option<Located<V1RadioControl>>,
     pub manual_pitch_rate_dps: Option<Located<f64>>,
     pub manual_yaw_rate_dps: Option<Located<f64>>,
 }
@@ -147,7 +156,10 @@ fn gimbal(section: &mut Section<'_>, place: Place) -> Gimbal {
         takeover: section.read("takeover", |raw| word(raw, TAKEOVERS)),
         setpoint_rate_hz: section.read("setpoint_rate_hz", |raw| whole(raw, 5..=50)),
         device_yaw_frame: section.read("device_yaw_frame", |raw| word(raw, YAW_FRAMES)),
-        v1_sign: section.read("v1_sign", |raw| word(raw, SIGNS)),
+        v1_sign: section.read("v1_sign", signs),
+        v1_report_sign: section.read("v1_report_sign", signs),
+        v1_configure: section.read("v1_configure", flag),
+        v1_radio_control: section.read("v1_radio_control", |raw| word(raw, V1_RADIO_CONTROLS)),
         manual_pitch_rate_dps: section.read("manual_pitch_rate_dps", manual_rate),
         manual_yaw_rate_dps: section.read("manual_yaw_rate_dps", manual_rate),
     }

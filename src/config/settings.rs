@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use crate::bridge::settings::{LinkSettings, Role, Settings, Transport};
 use crate::endpoint::Endpoint;
+use crate::gimbals::mavlink_v1::config::V1Settings;
 use crate::gimbals::settings::GimbalSettings;
 use crate::manager::settings::ControlSettings;
 
@@ -103,7 +104,12 @@ fn gimbal(gimbal: Gimbal, links: &[LinkSettings]) -> GimbalSettings {
         takeover: value_or(gimbal.takeover, default.takeover),
         setpoint_rate_hz: value_or(gimbal.setpoint_rate_hz, default.setpoint_rate_hz),
         device_yaw_frame: value_or(gimbal.device_yaw_frame, default.device_yaw_frame),
-        v1_sign: value_or(gimbal.v1_sign, default.v1_sign),
+        v1: V1Settings {
+            sign: value_or(gimbal.v1_sign, default.v1.sign),
+            report_sign: value_or(gimbal.v1_report_sign, default.v1.report_sign),
+            configures: value_or(gimbal.v1_configure, default.v1.configures),
+            radio_control: value_or(gimbal.v1_radio_control, default.v1.radio_control),
+        },
         manual_pitch_rate_dps: value_or(gimbal.manual_pitch_rate_dps, default.manual_pitch_rate_dps),
         manual_yaw_rate_dps: value_or(gimbal.manual_yaw_rate_dps, default.manual_yaw_rate_dps),
         name: default.name,

@@ -11,6 +11,6 @@ pub fn driver(family: Family, settings: &GimbalSettings) -> Box<dyn GimbalDriver
     match family {
         Family::Auto => Box::new(Detection::new(settings.clone())),
         Family::MavlinkV2 => Box::new(MavlinkV2Driver::new()),
-        Family::MavlinkV1 => Box::new(MavlinkV1Driver::new(settings.v1_sign)),
+        Family::MavlinkV1 => Box::new(MavlinkV1Driver::new(settings.v1)),
     }
 }

@@ -1,5 +1,6 @@
 //! Gimbals that speak MAVLink v1 mount commands, as ArduPilot's contract for them has it.
 
+pub mod config;
 pub mod driver;
 pub mod packet;
 pub mod sim;

@@ -1,6 +1,6 @@
 //! What the user may say of one gimbal.
 
-use super::mavlink_v1::packet::Signs;
+use super::mavlink_v1::config::V1Settings;
 
 /// A `[[gimbal]]` entry.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,8 +16,8 @@ pub struct GimbalSettings {
     /// How often an active setpoint is repeated to the device, 5 to 50.
     pub setpoint_rate_hz: u8,
     pub device_yaw_frame: DeviceYawFrame,
-    /// Which way a v1 gimbal counts pitch and yaw.
-    pub v1_sign: Signs,
+    /// Of a v1 gimbal.
+    pub v1: V1Settings,
     /// Full deflection of manual control (288), degrees per second.
     pub manual_pitch_rate_dps: f64,
     pub manual_yaw_rate_dps: f64,
@@ -35,7 +35,7 @@ impl GimbalSettings {
             takeover: Takeover::Open,
             setpoint_rate_hz: 20,
             device_yaw_frame: DeviceYawFrame::Auto,
-            v1_sign: Signs::Normal,
+            v1: V1Settings::default(),
             manual_pitch_rate_dps: 30.0,
             manual_yaw_rate_dps: 30.0,
         }

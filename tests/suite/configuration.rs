@@ -12,8 +12,9 @@ use nix::unistd::mkfifo;
 use gimbald::bridge::settings::{LinkSettings, Role, Settings, SystemId, Transport};
 use gimbald::config::settings::{DaemonSettings, Directories, HttpSettings};
 use gimbald::config::{self, problem::Problems};
-use gimbald::gimbals::mavlink_v1::packet::Signs;
+use gimbald::gimbals::mavlink_v1::config::{V1RadioControl, V1Settings};
 use gimbald::gimbals::settings::{DeviceYawFrame, Family, GimbalSettings, Takeover};
+use gimbald::gimbals::signs::{Sign, Signs};
 use gimbald::manager::settings::{AltitudeReference, ControlSettings, Firewall};
 
 use crate::gimbald::{Outcome, gimbald};
@@ -238,7 +239,16 @@ fn numbers_have_ranges_and_kinds() {
         ("takeover = \"polite\"", "found \"polite\"; expected open, ask, priority or exclusive"),
         ("takeover = true", "found true; expected open, ask, priority or exclusive"),
         ("device_yaw_frame = \"erath\"", "found \"erath\"; expected auto, vehicle or earth; did you mean earth?"),
-        ("v1_sign = \"negated\"", "found \"negated\"; expected normal or reversed"),
+        (
+            "v1_sign = \"negated\"",
+            "found \"negated\"; expected normal or reversed, or a table such as { pitch = -1, yaw = -1 }",
+        ),
+        ("v1_sign = { pitch = -2 }", "found a table; expected 1 or -1 for pitch"),
+        ("v1_sign = { pitch = \"-1\" }", "found a table; expected 1 or -1 for pitch"),
+        ("v1_report_sign = { tilt = -1 }", "found a table; expected a table with roll, pitch and yaw"),
+        ("v1_report_sign = -1", "found -1; expected normal or reversed, or a table such as { pitch = -1, yaw = -1 }"),
+        ("v1_configure = \"px4\"", "found \"px4\"; expected true or false"),
+        ("v1_radio_control = \"mod\"", "found \"mod\"; expected none, silence or mode; did you mean mode?"),
         ("family = \"gremsy\"", "found \"gremsy\"; expected auto, mavlink_v2 or mavlink_v1"),
         ("link = 1", "found 1; expected the name of a link as text"),
     ] {
@@ -619,7 +629,10 @@ manager_component_id = 200
 takeover = "ask"
 setpoint_rate_hz = 30
 device_yaw_frame = "earth"
-v1_sign = "reversed"
+v1_sign = { pitch = -1, roll = 1.0, yaw = -1 }
+v1_report_sign = "reversed"
+v1_configure = true
+v1_radio_control = "mode"
 manual_pitch_rate_dps = 12.5
 manual_yaw_rate_dps = 45
 [vehicle]
@@ -672,7 +685,12 @@ fn every_key_arrives_where_it_belongs() {
                 takeover: Takeover::Ask,
                 setpoint_rate_hz: 30,
                 device_yaw_frame: DeviceYawFrame::Earth,
-                v1_sign: Signs::Reversed,
+                v1: V1Settings {
+                    sign: Signs::REVERSED,
+                    report_sign: Signs::REVERSED,
+                    configures: true,
+                    radio_control: V1RadioControl::Mode,
+                },
                 manual_pitch_rate_dps: 12.5,
                 manual_yaw_rate_dps: 45.0,
             }],
@@ -738,6 +756,26 @@ fn links_that_call_speak_first() {
     }
 }
 
+/// A table of signs names the axes that differ from its words.
+#[test]
+fn each_axis_of_a_gimbal_has_a_sign_of_its_own() {
+    let signs = |given: &str| {
+        let text = format!("{LINK}[[gimbal]]\nname = \"camera\"\nv1_sign = {given}\n");
+        load(&text, &[]).map(|loaded| loaded.core.gimbals[0].v1.sign)
+    };
+    let opposite = Sign::Opposite;
+    for (given, expected) in [
+        ("\"normal\"", Signs::NORMAL),
+        ("\"reversed\"", Signs::REVERSED),
+        ("{}", Signs::NORMAL),
+        ("{ pitch = -1 }", Signs { pitch: opposite, ..Signs::NORMAL }),
+        ("{ roll = -1, yaw = 1 }", Signs { roll: opposite, ..Signs::NORMAL }),
+        ("{ pitch = -1.0, yaw = -1 }", Signs::REVERSED),
+    ] {
+        assert_eq!(signs(given), Ok(expected), "{given}");
+    }
+}
+
 /// Every key of every section is read from a variable as it is from the file.
 #[test]
 fn variables_override_the_file() {
@@ -752,6 +790,9 @@ fn variables_override_the_file() {
         ("GIMBALD__GIMBAL__NOSE_CAM__SETPOINT_RATE_HZ", "30"),
         ("GIMBALD__GIMBAL__NOSE_CAM__DEVICE_YAW_FRAME", "earth"),
         ("GIMBALD__GIMBAL__NOSE_CAM__V1_SIGN", "reversed"),
+        ("GIMBALD__GIMBAL__NOSE_CAM__V1_REPORT_SIGN", "reversed"),
+        ("GIMBALD__GIMBAL__NOSE_CAM__V1_CONFIGURE", "true"),
+        ("GIMBALD__GIMBAL__NOSE_CAM__V1_RADIO_CONTROL", "mode"),
         ("GIMBALD__GIMBAL__NOSE_CAM__MANUAL_PITCH_RATE_DPS", "12.5"),
         ("GIMBALD__GIMBAL__NOSE_CAM__MANUAL_YAW_RATE_DPS", "45"),
         ("GIMBALD__VEHICLE__SYSTEM_ID", "7"),

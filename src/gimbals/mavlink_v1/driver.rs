@@ -1,24 +1,26 @@
 //! The conversation with a v1 gimbal: it is told angles, and says where it looks, or does not.
 //!
 //! A v1 gimbal is heard by its heartbeats alone. It has no rates and no yaw from North, so both are turned into angles
-//! against the vehicle before they come here.
+//! against the vehicle before they come here. One that must be configured is sent the newest setpoint when it has answered
+//! that, or will not.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use super::packet::{self, MountControl, Signs};
+use super::config::{V1RadioControl, V1Settings};
+use super::packet::{self, MountControl};
 use crate::geometry::{Angle, AngularRate, Attitude, AxisLimits, GimbalAngles, Limits, VehicleFrame};
 use crate::gimbals::capabilities::Capabilities;
 use crate::gimbals::details::GimbalDetails;
 use crate::gimbals::driver::{CommandOutcome, DriverOutput, GimbalDriver};
 use crate::gimbals::operation::{Operation, OperationError, OperationId};
 use crate::gimbals::report::{GimbalAttitude, GimbalStatus, Identity, Report};
-use crate::gimbals::setpoint::Setpoint;
+use crate::gimbals::setpoint::{Pointing, RadioControl, Setpoint};
 use crate::gimbals::settings::Family;
 use crate::timers::TimerTable;
 use crate::timestamp::Timestamp;
 use crate::wire::dialect::{COMMAND_LONG_DATA, HEARTBEAT_DATA, MOUNT_STATUS_DATA, MessageData};
-use crate::wire::ids::{CapFlags, FailureFlags, GimbalFlags, mav_state, message};
+use crate::wire::ids::{CapFlags, CommandResult, FailureFlags, GimbalFlags, mav_state, message};
 use crate::wire::{Frame, MavId};
 
 /// A gimbal not heard for so long is lost: five heartbeats.
@@ -36,17 +38,19 @@ const OPEN_LOOP_INTERVAL: Duration = Duration::from_millis(100);
 const OPEN_LOOP_RATE: AngularRate = AngularRate::from_degrees_per_second(30.0);
 
 /// What is assumed of a v1 gimbal, which cannot say: three axes held to the horizon, yaw against the vehicle.
-fn capabilities() -> Capabilities {
+fn capabilities(settings: &V1Settings) -> Capabilities {
     let degrees = Angle::from_degrees;
+    let mut flags = CapFlags::HAS_RETRACT
+        | CapFlags::HAS_NEUTRAL
+        | CapFlags::HAS_ROLL_AXIS
+        | CapFlags::HAS_ROLL_LOCK
+        | CapFlags::HAS_PITCH_AXIS
+        | CapFlags::HAS_PITCH_LOCK
+        | CapFlags::HAS_YAW_AXIS
+        | CapFlags::HAS_YAW_FOLLOW;
+    flags.set(CapFlags::HAS_RC_INPUTS, settings.radio_control != V1RadioControl::None);
     Capabilities {
-        flags: CapFlags::HAS_RETRACT
-            | CapFlags::HAS_NEUTRAL
-            | CapFlags::HAS_ROLL_AXIS
-            | CapFlags::HAS_ROLL_LOCK
-            | CapFlags::HAS_PITCH_AXIS
-            | CapFlags::HAS_PITCH_LOCK
-            | CapFlags::HAS_YAW_AXIS
-            | CapFlags::HAS_YAW_FOLLOW,
+        flags,
         // What ArduPilot lets pass to one.
         limits: Limits {
             roll: AxisLimits::new(degrees(-180.0), degrees(180.0)),
@@ -60,13 +64,14 @@ fn capabilities() -> Capabilities {
 /// Drives one v1 gimbal.
 #[derive(Debug)]
 pub struct MavlinkV1Driver {
-    signs: Signs,
+    settings: V1Settings,
     device: Option<MavId>,
     alive: bool,
     /// It says that it is ready for angles; what it is told before is kept for it.
     ready: bool,
     wanted: Option<MountControl>,
     sent: Option<(Timestamp, MountControl)>,
+    configuration: Configuration,
     feedback: Feedback,
     /// Where it is taken to look while it does not say so.
     assumed: GimbalAngles,
@@ -87,6 +92,15 @@ enum Feedback {
     OpenLoop,
 }
 
+/// What became of the `DO_MOUNT_CONFIGURE` that such a gimbal needs before another mode, a `MAV_MOUNT_MODE`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Configuration {
+    Unknown,
+    /// Sent, and neither answered nor given up.
+    UnderWay(u8),
+    Done(u8),
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Timer {
     /// When to call the gimbal lost.
@@ -100,14 +114,15 @@ enum Timer {
 }
 
 impl MavlinkV1Driver {
-    pub fn new(signs: Signs) -> Self {
+    pub fn new(settings: V1Settings) -> Self {
         Self {
-            signs,
+            settings,
             device: None,
             alive: false,
             ready: false,
             wanted: None,
             sent: None,
+            configuration: Configuration::Unknown,
             feedback: Feedback::Awaited,
             assumed: GimbalAngles::default(),
             assumed_at: Timestamp::ZERO,
@@ -123,14 +138,19 @@ impl MavlinkV1Driver {
         }
         self.alive = true;
         self.report(Report::Alive { device });
-        self.report(Report::Known(self.identity(), capabilities()));
+        self.report(Report::Known(self.identity(), capabilities(&self.settings)));
         self.feedback = Feedback::Awaited;
         self.timers.set(Timer::FeedbackMissing, now + FEEDBACK_MISSING_AFTER);
     }
 
     fn handle_heartbeat(&mut self, now: Timestamp, heartbeat: &HEARTBEAT_DATA) {
         // "system_status ACTIVE only when ready for angle targets"; many never set it, so only what says otherwise counts.
-        let ready = !matches!(heartbeat.system_status, mav_state::BOOT | mav_state::CALIBRATING | mav_state::POWEROFF);
+        let state = heartbeat.system_status;
+        let ready =
+            !matches!(state, mav_state::BOOT | mav_state::CALIBRATING | mav_state::STANDBY | mav_state::POWEROFF);
+        if state == mav_state::BOOT {
+            self.configuration = Configuration::Unknown;
+        }
         if ready && !self.ready {
             self.ready = true;
             self.send_when_due(now);
@@ -149,7 +169,7 @@ impl MavlinkV1Driver {
         self.assumed = attitude.gimbal_angles();
         self.assumed_at = now;
         if was_open_loop {
-            self.report(Report::Known(self.identity(), capabilities()));
+            self.report(Report::Known(self.identity(), capabilities(&self.settings)));
         }
         self.report_attitude(attitude);
     }
@@ -159,6 +179,9 @@ impl MavlinkV1Driver {
         flags |= match self.sent {
             Some((_, MountControl::Retract)) => GimbalFlags::RETRACT,
             Some((_, MountControl::Neutral)) => GimbalFlags::NEUTRAL | GimbalFlags::ROLL_LOCK | GimbalFlags::PITCH_LOCK,
+            Some((_, MountControl::RadioControl)) => {
+                GimbalFlags::RC_EXCLUSIVE | GimbalFlags::ROLL_LOCK | GimbalFlags::PITCH_LOCK
+            }
             Some((_, MountControl::Angles(_))) | None => GimbalFlags::ROLL_LOCK | GimbalFlags::PITCH_LOCK,
         };
         self.report(Report::Attitude(GimbalStatus {
@@ -189,11 +212,32 @@ impl MavlinkV1Driver {
             self.timers.set(Timer::Send, due);
             return;
         }
+        let silent = wanted == MountControl::RadioControl && self.settings.radio_control == V1RadioControl::Silence;
+        if !silent && !self.is_configured(device, wanted.mode()) {
+            // What comes in the meantime takes the place of what is wanted now.
+            return;
+        }
         self.carry_assumed_on(now);
         self.sent = Some((now, wanted));
+        if silent {
+            self.timers.cancel(Timer::Send);
+            return;
+        }
         self.timers.set(Timer::Send, now + REPEAT_EVERY);
-        let message = packet::mount_control(device, wanted, self.signs);
+        let message = packet::mount_control(device, wanted, self.settings.sign);
         self.outputs.push_back(DriverOutput::Message(Box::new(message)));
+    }
+
+    /// Whether the gimbal may be told something in `mode`; if not, it is configured for it.
+    fn is_configured(&mut self, device: MavId, mode: u8) -> bool {
+        if !self.settings.configures || self.configuration == Configuration::Done(mode) {
+            return true;
+        }
+        if !matches!(self.configuration, Configuration::UnderWay(_)) {
+            self.configuration = Configuration::UnderWay(mode);
+            self.outputs.push_back(DriverOutput::Command(Box::new(packet::mount_configure(device, mode))));
+        }
+        false
     }
 
     /// Moves the gimbal that says nothing to where it was told to go.
@@ -203,7 +247,7 @@ impl MavlinkV1Driver {
         let target = match self.sent {
             Some((_, MountControl::Angles(angles))) => angles,
             Some((_, MountControl::Retract | MountControl::Neutral)) => GimbalAngles::default(),
-            None => return,
+            Some((_, MountControl::RadioControl)) | None => return,
         };
         let step = |at: Angle, to: Angle| at + (to - at).clamp(-most, most);
         self.assumed = GimbalAngles {
@@ -229,6 +273,7 @@ impl MavlinkV1Driver {
         // What it is told next is told anew, and not before it is asked for again.
         self.wanted = None;
         self.sent = None;
+        self.configuration = Configuration::Unknown;
         for timer in [Timer::Lost, Timer::Send, Timer::FeedbackMissing, Timer::OpenLoop] {
             self.timers.cancel(timer);
         }
@@ -243,7 +288,7 @@ impl GimbalDriver for MavlinkV1Driver {
 
     fn adopt(&mut self, _now: Timestamp, device: MavId) {
         let outputs = std::mem::take(&mut self.outputs);
-        *self = Self { device: Some(device), outputs, ..Self::new(self.signs) };
+        *self = Self { device: Some(device), outputs, ..Self::new(self.settings) };
     }
 
     fn handle_received(&mut self, now: Timestamp, frame: &Frame<'_>) {
@@ -256,7 +301,7 @@ impl GimbalDriver for MavlinkV1Driver {
             }
             message::MOUNT_ORIENTATION | message::MOUNT_STATUS => {
                 self.handle_heard(now, device);
-                if let Some(attitude) = packet::read_attitude(frame) {
+                if let Some(attitude) = packet::read_attitude(frame, self.settings.report_sign) {
                     self.handle_attitude(now, frame.message_id() == MOUNT_STATUS_DATA::ID, attitude);
                 }
             }
@@ -275,6 +320,11 @@ impl GimbalDriver for MavlinkV1Driver {
         self.wanted = Some(match setpoint {
             Setpoint::Retract => MountControl::Retract,
             Setpoint::Neutral => MountControl::Neutral,
+            Setpoint::Point(Pointing { radio_control: RadioControl::Exclusive, .. })
+                if self.settings.radio_control != V1RadioControl::None =>
+            {
+                MountControl::RadioControl
+            }
             Setpoint::Point(pointing) => MountControl::Angles(GimbalAngles {
                 roll: pointing.roll,
                 pitch: pointing.pitch,
@@ -286,8 +336,18 @@ impl GimbalDriver for MavlinkV1Driver {
         self.send_when_due(now);
     }
 
-    /// It gives out none.
-    fn handle_command_outcome(&mut self, _now: Timestamp, _command: &COMMAND_LONG_DATA, _outcome: CommandOutcome) {}
+    /// A gimbal that refuses to be configured, or does not answer, may do without.
+    fn handle_command_outcome(&mut self, now: Timestamp, command: &COMMAND_LONG_DATA, outcome: CommandOutcome) {
+        let Configuration::UnderWay(mode) = self.configuration else { return };
+        if f32::from(mode) != command.param1 {
+            return;
+        }
+        if outcome != CommandOutcome::Answered(CommandResult::Accepted as u8) {
+            tracing::debug!(mode, ?outcome, "the gimbal was not configured");
+        }
+        self.configuration = Configuration::Done(mode);
+        self.send_when_due(now);
+    }
 
     fn handle_operation(&mut self, _now: Timestamp, id: OperationId, _operation: Operation) {
         self.outputs.push_back(DriverOutput::Operated { id, result: Err(OperationError::Unsupported) });
@@ -301,7 +361,7 @@ impl GimbalDriver for MavlinkV1Driver {
                 Timer::FeedbackMissing => {
                     self.feedback = Feedback::OpenLoop;
                     self.assumed_at = now;
-                    self.report(Report::Known(self.identity(), capabilities()));
+                    self.report(Report::Known(self.identity(), capabilities(&self.settings)));
                     self.report_assumed(now);
                 }
                 Timer::OpenLoop => self.report_assumed(now),

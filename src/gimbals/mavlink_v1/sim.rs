@@ -5,8 +5,8 @@
 
 use std::time::Duration;
 
-use super::packet::Signs;
-use crate::geometry::{Angle, AxisLimits, Limits};
+use crate::geometry::{Angle, AxisLimits, GimbalAngles, Limits};
+use crate::gimbals::signs::Signs;
 use crate::sim::command::Command;
 use crate::sim::component::{Component, Line};
 use crate::sim::parameters::{IntegerEncoding, ParameterServer, ParameterValue};
@@ -34,10 +34,15 @@ pub struct DeviceSettings {
     pub component_id: u8,
     /// Until a vehicle is heard, it is silent.
     pub system_id: SystemId,
+    /// How it counts in what it is told.
     pub signs: Signs,
+    /// How it counts in what it reports.
+    pub report_signs: Signs,
     pub feedback: Feedback,
     /// Asks the vehicle for `ATTITUDE` ten times a second and `GLOBAL_POSITION_INT` twice, as the contract allows.
     pub asks_for_streams: bool,
+    /// `DO_MOUNT_CONTROL` in another mode than the last `DO_MOUNT_CONFIGURE` named is refused, and in any before the first.
+    pub needs_configuring: bool,
     pub plant: PlantSettings,
 }
 
@@ -57,9 +62,11 @@ impl Default for DeviceSettings {
         Self {
             component_id: component::GIMBAL,
             system_id: SystemId::Adopt,
-            signs: Signs::Normal,
+            signs: Signs::NORMAL,
+            report_signs: Signs::NORMAL,
             feedback: Feedback::Orientation,
             asks_for_streams: false,
+            needs_configuring: false,
             plant: PlantSettings {
                 limits: Limits {
                     roll: AxisLimits::new(degrees(-45.0), degrees(45.0)),
@@ -84,6 +91,8 @@ pub struct Device {
     parameters: ParameterServer,
     plant: Plant,
     mode: u8,
+    /// The mode of the last `DO_MOUNT_CONFIGURE`.
+    configured: Option<u8>,
     is_speaking: bool,
     /// The vehicle's motion comes from outside, and not from its `ATTITUDE`.
     is_carried: bool,
@@ -108,6 +117,7 @@ impl Device {
             parameters: ParameterServer::new(parameters, IntegerEncoding::Bytewise),
             plant: Plant::new(now, settings.plant.clone()),
             mode: mount_mode::MAVLINK_TARGETING,
+            configured: None,
             is_speaking: false,
             is_carried: false,
             settings,
@@ -116,6 +126,11 @@ impl Device {
 
     pub fn id(&self) -> MavId {
         self.line.id()
+    }
+
+    /// The `MAV_MOUNT_MODE` it is in.
+    pub fn mode(&self) -> u8 {
+        self.mode
     }
 
     /// The mechanics, to look at.
@@ -164,7 +179,11 @@ impl Device {
     fn handle_command(&mut self, now: Timestamp, command: &Command) {
         let result = match command.number {
             command::DO_MOUNT_CONTROL => self.mount_control(command),
-            command::DO_MOUNT_CONFIGURE => self.set_mode(command.params[0]),
+            command::DO_MOUNT_CONFIGURE => {
+                let result = self.set_mode(command.params[0]);
+                self.configured = (result == CommandResult::Accepted).then_some(self.mode).or(self.configured);
+                result
+            }
             command::SET_MESSAGE_INTERVAL => {
                 let id = command.message_id();
                 let known = matches!(id, message::MOUNT_ORIENTATION | message::MOUNT_STATUS);
@@ -205,6 +224,9 @@ impl Device {
 
     fn mount_control(&mut self, command: &Command) -> CommandResult {
         let [pitch, roll, yaw, .., mode] = command.params;
+        if self.settings.needs_configuring && self.configured.map(f64::from) != Some(mode) {
+            return CommandResult::Denied;
+        }
         let result = self.set_mode(mode);
         if result != CommandResult::Accepted || self.mode != mount_mode::MAVLINK_TARGETING {
             return result;
@@ -212,14 +234,12 @@ impl Device {
         if ![pitch, roll, yaw].iter().all(|degrees| degrees.is_finite()) {
             return CommandResult::Denied;
         }
-        let sign = match self.settings.signs {
-            Signs::Normal => 1.0,
-            Signs::Reversed => -1.0,
-        };
-        let to = |degrees: f64| Drive::To { angle: Angle::from_degrees(degrees), speed: None };
-        self.plant.set_pitch(to(sign * pitch));
+        let [roll, pitch, yaw] = [roll, pitch, yaw].map(Angle::from_degrees);
+        let GimbalAngles { roll, pitch, yaw } = self.settings.signs.apply(GimbalAngles { roll, pitch, yaw });
+        let to = |angle: Angle| Drive::To { angle, speed: None };
+        self.plant.set_pitch(to(pitch));
         self.plant.set_roll(to(roll));
-        self.plant.set_yaw(YawHold::Vehicle, to(sign * yaw));
+        self.plant.set_yaw(YawHold::Vehicle, to(yaw));
         CommandResult::Accepted
     }
 
@@ -244,6 +264,9 @@ impl Device {
 
     fn report(&mut self, now: Timestamp, id: u32) {
         let pose = self.plant.measure(now);
+        let absolute = (pose.yaw + self.plant.platform_heading(now)).wrapped();
+        let told = GimbalAngles { roll: pose.roll, pitch: pose.pitch, yaw: pose.yaw.wrapped() };
+        let told = self.settings.report_signs.apply(told);
         let up = now.since(self.boot);
         match id {
             message::HEARTBEAT => self.line.outbox.send(&HEARTBEAT_DATA {
@@ -255,21 +278,20 @@ impl Device {
                 mavlink_version: 3,
             }),
             message::MOUNT_ORIENTATION => {
-                let heading = self.plant.platform_heading(now);
                 self.line.outbox.send(&MOUNT_ORIENTATION_DATA {
                     time_boot_ms: (Timestamp::ZERO + up).boot_ms(),
-                    roll: pose.roll.degrees() as f32,
-                    pitch: pose.pitch.degrees() as f32,
-                    yaw: pose.yaw.wrapped().degrees() as f32,
-                    yaw_absolute: (pose.yaw + heading).wrapped().degrees() as f32,
+                    roll: told.roll.degrees() as f32,
+                    pitch: told.pitch.degrees() as f32,
+                    yaw: told.yaw.degrees() as f32,
+                    yaw_absolute: absolute.degrees() as f32,
                 });
             }
             message::MOUNT_STATUS => {
                 let hundredths = |angle: Angle| (angle.degrees() * 100.0).round() as i32;
                 self.line.outbox.send(&MOUNT_STATUS_DATA {
-                    pointing_a: hundredths(pose.pitch),
-                    pointing_b: hundredths(pose.roll),
-                    pointing_c: hundredths(pose.yaw.wrapped()),
+                    pointing_a: hundredths(told.pitch),
+                    pointing_b: hundredths(told.roll),
+                    pointing_c: hundredths(told.yaw),
                     target_system: 0,
                     target_component: 0,
                     mount_mode: self.mode,

@@ -1,0 +1,35 @@
+//! The signs of a gimbal's axes: a word for what is usual, or a table with 1 or −1 for each axis that is named.
+
+use crate::gimbals::signs::{Sign, Signs};
+
+use super::document::{Raw, Table};
+use super::reader::{Expected, number, word};
+
+const WORDS: &[(&str, Signs)] = &[("normal", Signs::NORMAL), ("reversed", Signs::REVERSED)];
+
+/// A variable can hold a word only.
+pub(super) fn signs(raw: &Raw) -> Result<Signs, Expected> {
+    match raw {
+        Raw::Table(table) => axes(table),
+        raw => word(raw, WORDS)
+            .map_err(|Expected(words)| Expected(format!("{words}, or a table such as {{ pitch = -1, yaw = -1 }}"))),
+    }
+}
+
+fn axes(table: &Table) -> Result<Signs, Expected> {
+    let mut signs = Signs::NORMAL;
+    for (key, value) in table {
+        let axis = match key.as_str() {
+            "roll" => &mut signs.roll,
+            "pitch" => &mut signs.pitch,
+            "yaw" => &mut signs.yaw,
+            _ => return Err(Expected::new("a table with roll, pitch and yaw")),
+        };
+        *axis = match number(&value.raw, &(-1.0..=1.0)) {
+            Some(1.0) => Sign::Same,
+            Some(-1.0) => Sign::Opposite,
+            _ => return Err(Expected(format!("1 or -1 for {key}"))),
+        };
+    }
+    Ok(signs)
+}

@@ -1,0 +1,37 @@
+//! What the user may say of a v1 gimbal.
+
+use crate::gimbals::signs::Signs;
+
+/// The keys of the family.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct V1Settings {
+    /// How it counts in what it is told.
+    pub sign: Signs,
+    /// How it counts in what it reports.
+    pub report_sign: Signs,
+    /// It is sent `DO_MOUNT_CONFIGURE` before each change of mode, as `PX4` does and `ArduPilot` never.
+    pub configures: bool,
+    pub radio_control: V1RadioControl,
+}
+
+/// How its own radio control gets it, if it has one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum V1RadioControl {
+    /// It has none.
+    #[default]
+    None,
+    /// It has the gimbal whenever the gimbal is told nothing.
+    Silence,
+    /// It is given the gimbal by `DO_MOUNT_CONTROL` in `MAV_MOUNT_MODE_RC_TARGETING`.
+    Mode,
+}
+
+impl V1RadioControl {
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Silence => "silence",
+            Self::Mode => "mode",
+        }
+    }
+}
