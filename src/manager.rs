@@ -47,7 +47,7 @@ use events::{Event, RatesEnd};
 use heading::HeadingBias;
 use intervals::{DEFAULT_STATUS_INTERVAL, Schedule};
 use messages::Interval;
-use mount::ConfiguredInputs;
+use mount::MountSenders;
 use rank::Ranks;
 use request::{Demand, DemandKind, Refusal, Request};
 use settings::ControlSettings;
@@ -107,6 +107,10 @@ pub enum ManagerOutput {
         id: OperationId,
         operation: Operation,
     },
+    /// The autopilot is to be asked for a message that it may never have sent.
+    AskAutopilot {
+        message_id: u32,
+    },
     /// For whoever looks.
     Event(Event),
 }
@@ -165,7 +169,7 @@ pub struct GimbalManager {
     last_command: Option<LastCommand>,
     /// The autopilot as far as it drives the gimbal as a device of its own.
     autopilot_client: AutopilotClient,
-    configured_inputs: ConfiguredInputs,
+    mount_senders: MountSenders,
     /// What is being done in the place of where the gimbal was told to look: it is not told that again meanwhile.
     paused_by: Option<OperationId>,
     rejected: BTreeMap<MavId, BTreeMap<&'static str, u64>>,
@@ -200,7 +204,7 @@ impl GimbalManager {
             told_can_aim: false,
             last_command: None,
             autopilot_client: AutopilotClient::default(),
-            configured_inputs: ConfiguredInputs::default(),
+            mount_senders: MountSenders::default(),
             paused_by: None,
             rejected: BTreeMap::new(),
             outputs: VecDeque::new(),
@@ -240,6 +244,12 @@ impl GimbalManager {
                 Err(refusal) => self.count_refusal(sender.id, refusal.reason),
             },
             Request::Command(command) => self.handle_command(now, sender, command, around),
+            Request::Mount { target, message } => {
+                match self.handle_mount_message(now, sender.id, *target, *message, around) {
+                    Ok(()) => self.last_command = None,
+                    Err(refusal) => self.count_refusal(sender.id, refusal.reason),
+                }
+            }
         }
         self.carry_out(now, around);
     }

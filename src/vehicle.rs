@@ -52,8 +52,8 @@ pub struct Vehicle {
     estimator_status: Option<Dated<u16>>,
     /// Of home, above mean sea level.
     home_altitude_m: Option<Dated<f64>>,
-    /// The same from `HOME_POSITION`, which holds until home is set again.
-    home_position_altitude_m: Option<f64>,
+    /// `HOME_POSITION`, which holds until home is set again.
+    home_position: Option<Position>,
     yaw_rate: Option<Dated<AngularRate>>,
     landed_state: Option<Dated<LandedState>>,
 }
@@ -88,7 +88,11 @@ impl Vehicle {
         } else if let Some(message) = frame.decode::<AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA>() {
             self.handle_autopilot_state_for_gimbal_device(now, &message);
         } else if let Some(message) = frame.decode::<HOME_POSITION_DATA>() {
-            self.home_position_altitude_m = Some(metres(message.altitude));
+            self.home_position = Some(Position {
+                latitude_deg: f64::from(message.latitude) / 1e7,
+                longitude_deg: f64::from(message.longitude) / 1e7,
+                altitude_m: metres(message.altitude),
+            });
         } else if let Some(message) = frame.decode::<EXTENDED_SYS_STATE_DATA>() {
             self.set_landed_state(now, message.landed_state);
         } else if let Some(message) = frame.decode::<LOCAL_POSITION_NED_DATA>() {
@@ -175,7 +179,16 @@ impl Vehicle {
     /// As the position tells it (`alt` − `relative_alt`), or else as `HOME_POSITION` does.
     pub fn home_altitude_amsl(&self, now: Timestamp) -> Option<f64> {
         let told_by_position = self.home_altitude_m.and_then(|altitude| altitude.within(now, POSITION_WITHIN));
-        told_by_position.or(self.home_position_altitude_m)
+        told_by_position.or(self.home_position.map(|home| home.altitude_m))
+    }
+
+    /// Where home is, as `HOME_POSITION` tells it; altitude above mean sea level.
+    pub fn home_position(&self) -> Option<Position> {
+        self.home_position.filter(|home| {
+            let Position { latitude_deg, longitude_deg, altitude_m } = *home;
+            let on_earth = latitude_deg.abs() <= 90.0 && longitude_deg.abs() <= 180.0;
+            on_earth && (latitude_deg, longitude_deg, altitude_m) != (0.0, 0.0, 0.0)
+        })
     }
 
     /// How fast the vehicle turns about Down, to the right; not older than 1 s.

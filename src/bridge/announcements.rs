@@ -47,6 +47,7 @@ enum Kind {
     GivenBack,
     TakenOver,
     Refused,
+    Misread,
     AcquireWar,
 }
 
@@ -99,10 +100,13 @@ impl Announcements {
             Event::Refused { who, holder: Some(holder), .. } => {
                 (Kind::Refused, who, format!("{} refused, {} in control", name(who), name(holder)))
             }
+            Event::Refused { who, holder: None, reason } => {
+                (Kind::Misread, who, format!("{}: {}", name(who), misread(reason)?))
+            }
             _ => return None,
         };
         let (severity, kept) = match kind {
-            Kind::Refused => (severity::NOTICE, NOT_FOR_REFUSALS),
+            Kind::Refused | Kind::Misread => (severity::NOTICE, NOT_FOR_REFUSALS),
             Kind::AcquireWar => (severity::WARNING, 0),
             _ => (severity::NOTICE, 0),
         };
@@ -142,6 +146,17 @@ impl Announcements {
         }
         self.said.push((key, now));
         true
+    }
+}
+
+/// What the numbers of a request look like that was refused for them; whoever sends them sees nothing else of it, since
+/// old programs do not look at the answer, and messages have none.
+fn misread(reason: &str) -> Option<&'static str> {
+    match reason {
+        "looks_like_centidegrees" => Some("looks like centidegrees"),
+        "looks_like_a_place" => Some("looks like a place"),
+        "place_in_the_first_parameters" => Some("place in params 1 to 3"),
+        _ => None,
     }
 }
 
@@ -234,6 +249,9 @@ mod tests {
             Event::Control(change(How::Restored)),
             Event::Refused { who: widest, reason: "holder_must_release", holder: Some(widest) },
             Event::Refused { who: widest, reason: "not_in_control", holder: Some(widest) },
+            Event::Refused { who: widest, reason: "looks_like_centidegrees", holder: None },
+            Event::Refused { who: widest, reason: "looks_like_a_place", holder: None },
+            Event::Refused { who: widest, reason: "place_in_the_first_parameters", holder: None },
         ];
         for event in events {
             let subject =

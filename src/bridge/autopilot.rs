@@ -107,6 +107,14 @@ impl Bridge {
         self.transactions.send(now, Order { asker: Asker::Streams { message_id }, manager, command });
     }
 
+    /// Asks once for a message, in the name of a manager that needs it.
+    pub(super) fn ask_autopilot_for(&mut self, now: Timestamp, manager: u8, message_id: u32) {
+        if let Some(autopilot) = self.autopilot {
+            let command = packet::request_of(autopilot, message_id);
+            self.transactions.send(now, Order { asker: Asker::Message, manager, command });
+        }
+    }
+
     /// Whether there is an autopilot that has answered, or will not answer, what we asked of it before.
     pub(super) fn may_ask_autopilot(&self) -> bool {
         self.identity.system().is_some()

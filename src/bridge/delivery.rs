@@ -177,6 +177,8 @@ impl Bridge {
                 | message::GIMBAL_MANAGER_SET_ATTITUDE
                 | message::GIMBAL_MANAGER_SET_PITCHYAW
                 | message::GIMBAL_MANAGER_SET_MANUAL_CONTROL
+                | message::MOUNT_CONFIGURE
+                | message::MOUNT_CONTROL
         ) {
             return;
         }
@@ -184,6 +186,10 @@ impl Bridge {
         let overheard = self.is_overheard(now, from, frame);
         let for_us = |component: u8| overheard || target.includes(MavId::new(system, component));
         if !self.roster.iter().any(|gimbal| for_us(gimbal.component)) || self.is_own_id(frame.source()) {
+            return;
+        }
+        // A gimbal that speaks to mounts speaks to others of its kind.
+        if is_for_mounts(frame) && self.roster.is_device(frame.source()) {
             return;
         }
         let Some(request) = read_request(frame) else { return };
@@ -206,19 +212,17 @@ impl Bridge {
     /// Whether we are to act on a command to the autopilot that passes through us (`snoop_autopilot`). One that we do not
     /// forward to it is none of our business, as is all that is said where it is itself.
     fn is_overheard(&mut self, now: Timestamp, from: ChannelId, frame: &Frame<'_>) -> bool {
-        const WORTH_HEARING: [u16; 7] = [
+        const WORTH_HEARING: [u16; 5] = [
             command::DO_SET_ROI_LOCATION,
             command::DO_SET_ROI_NONE,
             command::DO_SET_ROI,
-            command::DO_MOUNT_CONFIGURE,
-            command::DO_MOUNT_CONTROL,
             command::DO_GIMBAL_MANAGER_PITCHYAW,
             command::DO_GIMBAL_MANAGER_CONFIGURE,
         ];
         let Target::Component(target) = frame.target() else { return false };
         self.settings.control.snoop_autopilot
             && self.autopilot == Some(target)
-            && command_number(frame).is_some_and(|number| WORTH_HEARING.contains(&number))
+            && (is_for_mounts(frame) || command_number(frame).is_some_and(|number| WORTH_HEARING.contains(&number)))
             && !self.router.route(now, from, frame.source(), frame.target()).channels.is_empty()
     }
 
@@ -325,6 +329,13 @@ impl Bridge {
             channels.union(self.channels_of_device(device)).union(self.router.routes().component_channels(device))
         })
     }
+}
+
+/// Whether it is a command or message of gimbal protocol v1 to a mount.
+pub(super) fn is_for_mounts(frame: &Frame<'_>) -> bool {
+    let by_message = matches!(frame.message_id(), message::MOUNT_CONFIGURE | message::MOUNT_CONTROL);
+    let commands = [command::DO_MOUNT_CONFIGURE, command::DO_MOUNT_CONTROL, command::DO_MOUNT_CONTROL_QUAT];
+    by_message || command_number(frame).is_some_and(|number| commands.contains(&number))
 }
 
 /// The number of a `COMMAND_LONG` or `COMMAND_INT`; it stands at the same place in both.

@@ -54,7 +54,7 @@ impl Default for Events {
 impl Events {
     /// Something happened around `gimbal`. The same request refused again and again is one event with a count.
     pub fn note(&mut self, now: Timestamp, gimbal: &str, names: Names, event: Event) {
-        if matches!(event, Event::Refused { .. }) {
+        if is_repetitive(&event) {
             let again = self.entries.iter().position(|entry| entry.is_repeated_by(gimbal, &event));
             if let Some(mut entry) = again.and_then(|at| self.entries.remove(at)) {
                 entry.event = event;
@@ -79,9 +79,9 @@ impl Events {
     }
 
     fn make_room(&mut self, event: &Event) {
-        let is_refusal = |entry: &Entry| matches!(entry.event, Event::Refused { .. });
+        let is_refusal = |entry: &Entry| is_repetitive(&entry.event);
         let refusals = self.entries.iter().filter(|entry| is_refusal(entry)).count();
-        let too_many = matches!(event, Event::Refused { .. }) && refusals >= REMEMBERED_REFUSALS;
+        let too_many = is_repetitive(event) && refusals >= REMEMBERED_REFUSALS;
         if too_many {
             let oldest = self.entries.iter().position(is_refusal);
             oldest.and_then(|at| self.entries.remove(at));
@@ -126,6 +126,11 @@ impl Bridge {
     }
 }
 
+/// Whether it comes by the stream: what is asked again and again is refused, or doubtful, each time.
+fn is_repetitive(event: &Event) -> bool {
+    matches!(event, Event::Refused { .. } | Event::Doubtful { .. })
+}
+
 /// The gimbal as texts about it name it.
 fn subject(gimbal: &Gimbal, names: Names) -> Subject<'_> {
     let settings = gimbal.manager.settings();
@@ -135,8 +140,9 @@ fn subject(gimbal: &Gimbal, names: Names) -> Subject<'_> {
 impl Entry {
     fn is_repeated_by(&self, gimbal: &str, event: &Event) -> bool {
         let same = |one: &Event, other: &Event| {
-            matches!((one, other), (Event::Refused { .. }, Event::Refused { .. }))
-                && (one.who(), one.reason()) == (other.who(), other.reason())
+            is_repetitive(one)
+                && is_repetitive(other)
+                && (one.name(), one.who(), one.reason()) == (other.name(), other.who(), other.reason())
         };
         self.gimbal == gimbal && same(&self.event, event)
     }
@@ -145,12 +151,12 @@ impl Entry {
     /// first, the second, the fourth …
     fn log(&self, told: bool) {
         let Self { gimbal, names, event, count, .. } = self;
-        if matches!(event, Event::Refused { .. }) && !count.is_power_of_two() {
+        if is_repetitive(event) && !count.is_power_of_two() {
             return;
         }
         let (what, text) = (event.name(), event.describe(*names));
         match event {
-            Event::Refused { .. } => tracing::debug!(gimbal, what, text, count, "event"),
+            event if is_repetitive(event) => tracing::debug!(gimbal, what, text, count, "event"),
             Event::Lost { .. } | Event::AcquireWar { .. } if told => tracing::warn!(gimbal, what, text, "event"),
             _ if told => tracing::info!(gimbal, what, text, "event"),
             _ => tracing::debug!(gimbal, what, text, "event"),

@@ -6,7 +6,7 @@
 
 use super::Bridge;
 use super::conflicts::{Conflict, Outcome};
-use super::delivery::command_number;
+use super::delivery::is_for_mounts;
 use super::devices::is_of_device;
 use super::roster::Place;
 use super::settings::Role;
@@ -17,7 +17,7 @@ use crate::wire::Frame;
 use crate::wire::dialect::{
     GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_MANAGER_INFORMATION_DATA, GIMBAL_MANAGER_STATUS_DATA,
 };
-use crate::wire::ids::{command, message};
+use crate::wire::ids::message;
 
 impl Bridge {
     /// Keeps from managed devices what others send straight to them, and on its link what a device sends as a manager.
@@ -58,9 +58,7 @@ impl Bridge {
                 channels
             }
             message::GIMBAL_DEVICE_SET_ATTITUDE => self.keep_from_devices(now, place, frame, channels),
-            message::COMMAND_LONG | message::COMMAND_INT if is_mount_command(frame) => {
-                self.keep_from_devices(now, place, frame, channels)
-            }
+            _ if is_for_mounts(frame) => self.keep_from_devices(now, place, frame, channels),
             _ => channels,
         }
     }
@@ -130,11 +128,4 @@ fn device_id_of_manager(frame: &Frame<'_>) -> Option<u8> {
         }
         _ => None,
     }
-}
-
-fn is_mount_command(frame: &Frame<'_>) -> bool {
-    matches!(
-        command_number(frame),
-        Some(command::DO_MOUNT_CONFIGURE | command::DO_MOUNT_CONTROL | command::DO_MOUNT_CONTROL_QUAT)
-    )
 }

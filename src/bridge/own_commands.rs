@@ -27,7 +27,7 @@ impl Bridge {
                             self.streams.handle_outcome(message_id, outcome);
                             self.look_after_streams(now);
                         }
-                        Asker::RivalWatch => {}
+                        Asker::RivalWatch | Asker::Message => {}
                         Asker::Driver => {
                             if let Some(gimbal) = self.roster.of_manager(order.manager) {
                                 gimbal.driver.handle_command_outcome(now, &order.command, outcome);

@@ -38,6 +38,8 @@ pub enum Asker {
     Driver,
     /// Whoever looks for another manager; what it wants to know comes as a message.
     RivalWatch,
+    /// A manager that wants a message of the autopilot, and takes what comes.
+    Message,
 }
 
 /// A command to one component.

@@ -114,6 +114,7 @@ pub(super) struct Control {
     pub command_rate_timeout: Option<Located<Duration>>,
     pub firewall: Option<Located<Firewall>>,
     pub snoop_autopilot: Option<Located<bool>>,
+    pub accept_centidegrees: Option<Located<bool>>,
     pub px4_release_quirk: Option<Located<bool>>,
     pub synthesize_286: Option<Located<bool>>,
 }
@@ -177,6 +178,7 @@ fn control(section: &mut Section<'_>) -> Control {
         command_rate_timeout: section.read("command_rate_timeout_s", timeout_or_never),
         firewall: section.read("firewall", |raw| word(raw, FIREWALLS)),
         snoop_autopilot: section.read("snoop_autopilot", flag),
+        accept_centidegrees: section.read("accept_centidegrees", flag),
         px4_release_quirk: section.read("px4_release_quirk", flag),
         synthesize_286: section.read("synthesize_286", |raw| word(raw, SYNTHESIS)),
     }

@@ -125,6 +125,7 @@ fn control(control: Control, roi: Roi) -> ControlSettings {
         command_rate_timeout: value_or(control.command_rate_timeout, default.command_rate_timeout),
         firewall: value_or(control.firewall, default.firewall),
         snoop_autopilot: value_or(control.snoop_autopilot, default.snoop_autopilot),
+        accept_centidegrees: value_or(control.accept_centidegrees, default.accept_centidegrees),
         px4_release_quirk: value_or(control.px4_release_quirk, default.px4_release_quirk),
         synthesize_286: value_or(control.synthesize_286, default.synthesize_286),
         roi_altitude: value_or(roi.altitude_reference, default.roi_altitude),

@@ -1,7 +1,7 @@
 //! `COMMAND_LONG` and `COMMAND_INT` for a gimbal manager, each with its one answer.
 //!
 //! What a command is about is in files of its own: [`super::inquiries`] (512, 511, 510), [`super::roi`] (195, 197),
-//! [`super::mount`] (204, 205). Those that we do not know are refused by name to whoever addressed exactly us, and are
+//! [`super::mount`] (204, 205, 220). Those that we do not know are refused by name to whoever addressed exactly us, and are
 //! somebody else's business when everybody was asked.
 
 use std::time::Duration;
@@ -72,7 +72,8 @@ impl GimbalManager {
             | command::DO_SET_ROI_LOCATION
             | command::DO_SET_ROI_NONE
             | command::DO_MOUNT_CONFIGURE
-            | command::DO_MOUNT_CONTROL => self.handle_once(now, sender.id, command, around),
+            | command::DO_MOUNT_CONTROL
+            | command::DO_MOUNT_CONTROL_QUAT => self.handle_once(now, sender.id, command, around),
             // Old ground stations say it to the autopilot; among managers it was superseded before there were any.
             command::DO_SET_ROI if around.overheard => self.handle_once(now, sender.id, command, around),
             number if command.is_directed() && !around.overheard => Err(unsupported(number)),
@@ -126,6 +127,7 @@ impl GimbalManager {
             }
             command::DO_MOUNT_CONFIGURE => self.do_mount_configure(now, sender, command, around)?,
             command::DO_MOUNT_CONTROL => self.do_mount_control(now, sender, command, around)?,
+            command::DO_MOUNT_CONTROL_QUAT => self.do_mount_control_quat(now, sender, command, around)?,
             // Places are the primary's, or nobody's.
             _ => {
                 voice.needs_whole()?;
@@ -152,7 +154,7 @@ impl GimbalManager {
 
     /// A rate that its sender says again before a streamed one would have ended is a stream, and ends like one: up to its
     /// releases of early 2026 QGroundControl turns a gimbal by commands every 500 ms, and may fail to send the last, zero.
-    fn kind_of(&self, now: Timestamp, sender: MavId, command: &Command) -> DemandKind {
+    pub(super) fn kind_of(&self, now: Timestamp, sender: MavId, command: &Command) -> DemandKind {
         let again = self.last_command.is_some_and(|last| {
             last.sender == sender
                 && now.since(last.at) <= self.rules.rate_timeout
@@ -163,13 +165,21 @@ impl GimbalManager {
 
     /// Whether a command is for this gimbal: an id that nobody here has is refused to whoever asked exactly us, and
     /// somebody else's business when everybody was asked or the autopilot was.
-    fn concerns_us(&self, sender: MavId, command: &Command, around: Surroundings<'_>) -> Result<bool, Refusal> {
+    pub(super) fn concerns_us(
+        &self,
+        sender: MavId,
+        command: &Command,
+        around: Surroundings<'_>,
+    ) -> Result<bool, Refusal> {
         let exactly_us = command.is_directed() && !around.overheard;
         if around.other_vehicle && !exactly_us {
             return Ok(false);
         }
         // What an autopilot says to every mount is how it drives one, and no wish of a client.
-        let to_mounts = matches!(command.number, command::DO_MOUNT_CONFIGURE | command::DO_MOUNT_CONTROL);
+        let to_mounts = matches!(
+            command.number,
+            command::DO_MOUNT_CONFIGURE | command::DO_MOUNT_CONTROL | command::DO_MOUNT_CONTROL_QUAT
+        );
         if to_mounts && !exactly_us && around.autopilot == Some(sender) {
             return Ok(false);
         }
@@ -201,7 +211,6 @@ fn unsupported(number: u16) -> Refusal {
         command::DO_SET_ROI_WPNEXT_OFFSET => "do_set_roi_wpnext_offset_unsupported",
         command::DO_SET_ROI_SYSID => "do_set_roi_sysid_unsupported",
         command::DO_SET_ROI => "do_set_roi_unsupported",
-        command::DO_MOUNT_CONTROL_QUAT => "do_mount_control_quat_unsupported",
         // Known, and never done for anybody.
         command::PREFLIGHT_REBOOT_SHUTDOWN => return Refusal::denied("preflight_reboot_shutdown_denied"),
         command::DO_GIMBAL_MANAGER_TRACK_RECTANGLE => "do_gimbal_manager_track_rectangle_unsupported",

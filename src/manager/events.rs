@@ -14,6 +14,11 @@ pub enum Event {
         reason: &'static str,
         holder: Option<MavId>,
     },
+    /// A request was done though its sender may have meant something else.
+    Doubtful {
+        who: MavId,
+        doubt: Doubt,
+    },
     /// Primary control was taken over too often; `holder` keeps it for a while, from `other` and everybody else.
     AcquireWar {
         holder: MavId,
@@ -53,6 +58,33 @@ pub enum Event {
     },
 }
 
+/// What a sender of gimbal protocol v1 may have meant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Doubt {
+    /// A yaw from the nose beyond 180°, as headings are.
+    YawLikeAHeading,
+    /// Hundredths of a degree, which it is now taken to send.
+    SendsCentidegrees,
+}
+
+impl Doubt {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::YawLikeAHeading => "yaw_like_a_heading",
+            Self::SendsCentidegrees => "sends_centidegrees",
+        }
+    }
+
+    const fn describe(self) -> &'static str {
+        match self {
+            Self::YawLikeAHeading => {
+                "gives a yaw from the nose that looks like a heading; DO_MOUNT_CONFIGURE with input 2 for yaw makes it one"
+            }
+            Self::SendsCentidegrees => "is taken to send hundredths of a degree (accept_centidegrees)",
+        }
+    }
+}
+
 /// Why a rotation ended by itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RatesEnd {
@@ -78,6 +110,7 @@ impl Event {
                 How::SystemGone => "system_gone",
             },
             Self::Refused { .. } => "refused",
+            Self::Doubtful { .. } => "doubtful",
             Self::AcquireWar { .. } => "acquire_war",
             Self::Found { .. } => "gimbal_found",
             Self::Back { .. } => "gimbal_back",
@@ -96,6 +129,7 @@ impl Event {
             Self::Control(Change { who, .. })
             | Self::Refused { who, .. }
             | Self::Operated { who, .. }
+            | Self::Doubtful { who, .. }
             | Self::RatesEnded { who, .. } => Some(who),
             Self::AcquireWar { holder, .. } => Some(holder),
             Self::Found { device } | Self::Back { device } => Some(device),
@@ -135,6 +169,7 @@ impl Event {
         match *self {
             Self::Refused { reason, .. } => Some(reason),
             Self::Operated { operation, .. } => Some(operation),
+            Self::Doubtful { doubt, .. } => Some(doubt.name()),
             Self::RatesEnded { end: RatesEnd::TimedOut, .. } => Some("timed_out"),
             Self::RatesEnded { end: RatesEnd::SenderSilent, .. } => Some("sender_silent"),
             _ => None,
@@ -151,6 +186,7 @@ impl Event {
             Self::Refused { who, reason, holder } => {
                 format!("{} was refused: {}", names.of(who), why(reason, holder, names))
             }
+            Self::Doubtful { who, doubt } => format!("{} {}", names.of(who), doubt.describe()),
             Self::AcquireWar { holder, other } => {
                 let others = other.map_or_else(|| "another".to_owned(), |other| names.of(other));
                 let holder = names.of(holder);
@@ -216,6 +252,17 @@ fn explain(reason: &str) -> String {
         "no_gimbal_yet" => "no gimbal was heard yet",
         "no_attitude" => "the attitude of the gimbal is not known",
         "no_heading" => "the heading of the vehicle is not known",
+        "no_home_position" => "the autopilot has not told where home is; it is asked",
+        "looks_like_centidegrees" => {
+            "its angles look like hundredths of a degree, and DO_MOUNT_CONTROL has degrees (accept_centidegrees = true takes them)"
+        }
+        "looks_like_a_place" => "its angles look like a place, which MOUNT_CONFIGURE or DO_MOUNT_CONFIGURE in mode 4 makes of them",
+        "place_in_the_first_parameters" => "it has the place in parameters 1 to 3, as of old; it belongs into 4 to 6",
+        "mount_mode_rc_targeting_unsupported" => "the gimbal has no radio control of its own",
+        "mount_mode_sysid_target_unsupported" => {
+            "a mount follows no other vehicle; DO_SET_ROI_LOCATION (195) with its position, again and again, does"
+        }
+        "mount_mode_wpnext_offset_unsupported" => "a mount knows no waypoints; DO_SET_ROI_LOCATION (195) points at one",
         _ => return reason.replace('_', " "),
     }
     .to_owned()

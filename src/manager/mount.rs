@@ -1,73 +1,22 @@
-//! The mount commands of gimbal protocol v1: `DO_MOUNT_CONFIGURE` (204) and `DO_MOUNT_CONTROL` (205).
+//! The mounts of gimbal protocol v1: `DO_MOUNT_CONFIGURE` (204), `DO_MOUNT_CONTROL` (205), `DO_MOUNT_CONTROL_QUAT` (220),
+//! and the messages `MOUNT_CONFIGURE` (156) and `MOUNT_CONTROL` (157), which nobody answers.
 //!
 //! Old clients send them to the autopilot, to us or to everybody; they pass the same gate as `DO_GIMBAL_MANAGER_PITCHYAW`
-//! (D5). Pitch and roll are held to the horizon. Yaw is from the nose unless its sender configured it as absolute.
-//! Angles no gimbal has are refused, since the likeliest reason is a sender of the old centidegrees.
+//! (D5). Numbers that cannot be meant as they were sent are refused by a name that says what they look like.
 
-use super::request::{AxisDemand, Command, Demand, DemandKind, Form, Refusal};
+mod reading;
+mod senders;
+
+use super::events::{Doubt, Event};
+use super::request::{Command, DemandKind, Form, MountMessage, Refusal};
 use super::roi::{Datum, degrees_of_integer};
-use super::{GimbalManager, Surroundings};
-use crate::geometry::Angle;
+use super::{GimbalManager, ManagerOutput, Surroundings};
 use crate::timestamp::Timestamp;
-use crate::wire::MavId;
-use crate::wire::ids::{CommandResult, GimbalFlags, mount_mode};
-
-/// So many senders can have configured their inputs; the one who did so first is forgotten first.
-const MAX_CONFIGURED_SENDERS: usize = 16;
-
-/// Degrees either way, as ArduPilot checks them.
-const PITCH_RANGE: f64 = 90.0;
-const ROLL_RANGE: f64 = 180.0;
-const YAW_RANGE: f64 = 360.0;
-
-/// Degrees; a number beyond that is in units of 1e-7 degrees.
-const COORDINATE_RANGE: f64 = 360.0;
-
-/// A `MAV_MOUNT_MODE` that we carry out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Mode {
-    Retract,
-    Neutral,
-    Angles,
-    Place,
-}
-
-/// What the number of an axis means ("0 = angle body frame, 1 = angular rate, 2 = angle absolute frame").
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Input {
-    #[default]
-    Angle,
-    Rate,
-    AbsoluteAngle,
-}
-
-/// The inputs of the three axes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Inputs {
-    roll: Input,
-    pitch: Input,
-    yaw: Input,
-}
-
-/// What each sender of 204 means by its numbers in 205; those who never sent it mean angles.
-#[derive(Debug, Default)]
-pub(super) struct ConfiguredInputs {
-    by_sender: Vec<(MavId, Inputs)>,
-}
-
-impl ConfiguredInputs {
-    fn set(&mut self, sender: MavId, inputs: Inputs) {
-        self.by_sender.retain(|(known, _)| *known != sender);
-        if self.by_sender.len() == MAX_CONFIGURED_SENDERS {
-            self.by_sender.remove(0);
-        }
-        self.by_sender.push((sender, inputs));
-    }
-
-    fn of(&self, sender: MavId) -> Inputs {
-        self.by_sender.iter().find(|(known, _)| *known == sender).map_or_else(Inputs::default, |(_, inputs)| *inputs)
-    }
-}
+use crate::wire::ids::{CapFlags, CommandResult, GimbalFlags, command, message};
+use crate::wire::{MavId, Target};
+use reading::{Mode, Numbers};
+use senders::Habits;
+pub(super) use senders::MountSenders;
 
 impl GimbalManager {
     pub(super) fn do_mount_configure(
@@ -77,17 +26,20 @@ impl GimbalManager {
         command: &Command,
         around: Surroundings<'_>,
     ) -> Result<(), Refusal> {
-        match mode(command.param(1))? {
-            Mode::Retract => self.handle_demand(now, sender, &pose(GimbalFlags::RETRACT), around),
-            Mode::Neutral => self.handle_demand(now, sender, &pose(GimbalFlags::NEUTRAL), around),
-            Mode::Angles => {
-                self.configured_inputs.set(sender, inputs(command));
-                Ok(())
-            }
+        let mode = Mode::read(command.param(1))?;
+        match mode {
+            Mode::Angles => self.mount_senders.change(sender, |habits| habits.inputs = reading::inputs(command)),
             // The place comes with 205.
-            Mode::Place if around.vehicle.position(now).is_some() => Ok(()),
-            Mode::Place => Err(Refusal::later("no_vehicle_position")),
+            Mode::Place if around.vehicle.position(now).is_none() => {
+                return Err(Refusal::later("no_vehicle_position"));
+            }
+            Mode::Place => {}
+            Mode::Retract | Mode::Neutral | Mode::RadioControl | Mode::Home => {
+                self.take_mode(now, sender, mode, around)?;
+            }
         }
+        self.mount_senders.change(sender, |habits| habits.mode = mode.number());
+        Ok(())
     }
 
     pub(super) fn do_mount_control(
@@ -97,95 +49,134 @@ impl GimbalManager {
         command: &Command,
         around: Surroundings<'_>,
     ) -> Result<(), Refusal> {
-        match mode(command.param(7))? {
-            Mode::Retract => self.handle_demand(now, sender, &pose(GimbalFlags::RETRACT), around),
-            Mode::Neutral => self.handle_demand(now, sender, &pose(GimbalFlags::NEUTRAL), around),
+        match Mode::read(command.param(7))? {
             Mode::Angles => {
-                let demand = angles(command, self.configured_inputs.of(sender))?;
-                self.handle_demand(now, sender, &demand, around)
+                let (habits, accepts) = (self.mount_senders.of(sender), self.rules.accept_centidegrees);
+                let numbers = Numbers::of_command(command)?;
+                let (numbers, sends_centidegrees) = reading::degrees(numbers, habits, accepts)?;
+                let kind = self.kind_of(now, sender, command);
+                self.turn_mount(now, sender, numbers, kind, around)?;
+                if sends_centidegrees && !habits.sends_centidegrees {
+                    self.mount_senders.change(sender, |habits| habits.sends_centidegrees = true);
+                    self.tell(Event::Doubtful { who: sender, doubt: Doubt::SendsCentidegrees });
+                }
+                Ok(())
             }
             Mode::Place => {
                 self.gate(now, sender, around)?.needs_whole()?;
-                command.check_integers()?;
-                self.look_at(now, sender, coordinates(command)?, command.finite(4)?, Datum::Home, around)
+                let coordinates = reading::coordinates(command)?;
+                self.look_at(now, sender, coordinates, command.finite(4)?, Datum::Home, around)
             }
+            mode => self.take_mode(now, sender, mode, around),
         }
+    }
+
+    pub(super) fn do_mount_control_quat(
+        &mut self,
+        now: Timestamp,
+        sender: MavId,
+        command: &Command,
+        around: Surroundings<'_>,
+    ) -> Result<(), Refusal> {
+        self.handle_demand(now, sender, &reading::quaternion(command)?, around)
+    }
+
+    /// 156 or 157: as 204 and 205, but for the units, and for the mode of 157, which the sender's 156 or 204 named.
+    pub(super) fn handle_mount_message(
+        &mut self,
+        now: Timestamp,
+        sender: MavId,
+        target: Target,
+        message: MountMessage,
+        around: Surroundings<'_>,
+    ) -> Result<(), Refusal> {
+        let Habits { mode, .. } = self.mount_senders.of(sender);
+        let command = match message {
+            MountMessage::Configure { mode } => mount_command(command::DO_MOUNT_CONFIGURE, 1, mode, target),
+            MountMessage::Control { .. } => mount_command(command::DO_MOUNT_CONTROL, 7, mode, target),
+        };
+        if !self.concerns_us(sender, &command, around)? {
+            return Ok(());
+        }
+        let voice = self.gate(now, sender, around)?;
+        let MountMessage::Control { inputs } = message else {
+            return self.do_mount_configure(now, sender, &command, around);
+        };
+        match Mode::read(command.param(7))? {
+            Mode::Angles => {
+                let numbers = Numbers::of_message(inputs);
+                if numbers.are_beyond_angles(self.mount_senders.of(sender).inputs) {
+                    let is_place = numbers.are_a_place();
+                    return Err(Refusal::denied(if is_place { "looks_like_a_place" } else { "angle_out_of_range" }));
+                }
+                self.turn_mount(now, sender, numbers, DemandKind::Streamed, around)
+            }
+            Mode::Place => {
+                voice.needs_whole()?;
+                let [latitude, longitude, altitude_cm] = inputs;
+                let coordinates = [Some(latitude), Some(longitude)].map(degrees_of_integer);
+                self.look_at(now, sender, coordinates, Some(altitude_cm as f32 / 100.0), Datum::Home, around)
+            }
+            mode => self.take_mode(now, sender, mode, around),
+        }
+    }
+
+    fn turn_mount(
+        &mut self,
+        now: Timestamp,
+        sender: MavId,
+        numbers: Numbers,
+        kind: DemandKind,
+        around: Surroundings<'_>,
+    ) -> Result<(), Refusal> {
+        let inputs = self.mount_senders.of(sender).inputs;
+        self.handle_demand(now, sender, &numbers.demand(inputs, kind)?, around)?;
+        if numbers.have_a_yaw_like_a_heading(inputs) {
+            self.tell(Event::Doubtful { who: sender, doubt: Doubt::YawLikeAHeading });
+        }
+        Ok(())
+    }
+
+    /// A mode that needs no numbers.
+    fn take_mode(
+        &mut self,
+        now: Timestamp,
+        sender: MavId,
+        mode: Mode,
+        around: Surroundings<'_>,
+    ) -> Result<(), Refusal> {
+        let flags = match mode {
+            Mode::Retract => GimbalFlags::RETRACT,
+            Mode::Neutral => GimbalFlags::NEUTRAL,
+            Mode::RadioControl => {
+                if !self.steerable()?.flags.contains(CapFlags::HAS_RC_INPUTS) {
+                    let reason = "mount_mode_rc_targeting_unsupported";
+                    return Err(Refusal { result: CommandResult::Unsupported, reason });
+                }
+                GimbalFlags::RC_EXCLUSIVE
+            }
+            Mode::Home => return self.look_home(now, sender, around),
+            // These come with numbers.
+            Mode::Angles | Mode::Place => return Ok(()),
+        };
+        self.handle_demand(now, sender, &reading::pose(flags), around)
+    }
+
+    /// Where home is told by the autopilot when it is set, and to who asks.
+    fn look_home(&mut self, now: Timestamp, sender: MavId, around: Surroundings<'_>) -> Result<(), Refusal> {
+        self.gate(now, sender, around)?.needs_whole()?;
+        let Some(home) = around.vehicle.home_position() else {
+            self.outputs.push_back(ManagerOutput::AskAutopilot { message_id: message::HOME_POSITION });
+            return Err(Refusal::later("no_home_position"));
+        };
+        let coordinates = [Some(home.latitude_deg), Some(home.longitude_deg)];
+        self.look_at(now, sender, coordinates, Some(home.altitude_m as f32), Datum::MeanSeaLevel, around)
     }
 }
 
-fn mode(number: Option<f32>) -> Result<Mode, Refusal> {
-    let number = number.filter(|number| number.fract() == 0.0 && (0.0..=255.0).contains(number));
-    let Some(number) = number else { return Err(Refusal::denied("unknown_mount_mode")) };
-    let reason = match number as u8 {
-        mount_mode::RETRACT => return Ok(Mode::Retract),
-        mount_mode::NEUTRAL => return Ok(Mode::Neutral),
-        mount_mode::MAVLINK_TARGETING => return Ok(Mode::Angles),
-        mount_mode::GPS_POINT => return Ok(Mode::Place),
-        mount_mode::RC_TARGETING => "mount_mode_rc_targeting_unsupported",
-        mount_mode::SYSID_TARGET => "mount_mode_sysid_target_unsupported",
-        mount_mode::HOME_LOCATION => "mount_mode_home_location_unsupported",
-        mount_mode::WPNEXT_OFFSET => "mount_mode_wpnext_offset_unsupported",
-        _ => return Err(Refusal::denied("unknown_mount_mode")),
-    };
-    Err(Refusal { result: CommandResult::Unsupported, reason })
-}
-
-/// The last three parameters of 204, in the order roll, pitch, yaw; a `COMMAND_INT` has plain numbers there.
-fn inputs(command: &Command) -> Inputs {
-    let [roll, pitch] = match command.form {
-        Form::Int { x, y, .. } => [x, y].map(|number| Some(number as f32)),
-        Form::Long => [command.param(5), command.param(6)],
-    };
-    let input = |number: Option<f32>| match number {
-        Some(1.0) => Input::Rate,
-        Some(2.0) => Input::AbsoluteAngle,
-        _ => Input::Angle,
-    };
-    Inputs { roll: input(roll), pitch: input(pitch), yaw: input(command.param(7)) }
-}
-
-/// Retract or neutral.
-fn pose(flags: GimbalFlags) -> Demand {
-    Demand { flags: flags | held(Input::Angle), kind: DemandKind::Commanded, ..Demand::default() }
-}
-
-/// The first three parameters of 205, in the order pitch, roll, yaw: degrees, or degrees per second.
-fn angles(command: &Command, inputs: Inputs) -> Result<Demand, Refusal> {
-    let axis = |number: usize, input: Input, range: f64| -> Result<AxisDemand, Refusal> {
-        if input == Input::Rate {
-            return Ok(AxisDemand { rate: command.degrees_per_second(number)?, ..AxisDemand::default() });
-        }
-        let degrees = command.finite(number)?.map(f64::from);
-        if degrees.is_some_and(|degrees| degrees.abs() > range) {
-            return Err(Refusal::denied("looks_like_centidegrees"));
-        }
-        Ok(AxisDemand { angle: degrees.map(Angle::from_degrees), ..AxisDemand::default() })
-    };
-    let yaw = axis(3, inputs.yaw, YAW_RANGE)?;
-    Ok(Demand {
-        flags: held(inputs.yaw),
-        pitch: axis(1, inputs.pitch, PITCH_RANGE)?,
-        roll: axis(2, inputs.roll, ROLL_RANGE)?,
-        yaw: AxisDemand { angle: yaw.angle.map(Angle::wrapped), ..yaw },
-        kind: DemandKind::Commanded,
-    })
-}
-
-fn held(yaw: Input) -> GimbalFlags {
-    let yaw = match yaw {
-        Input::Angle | Input::Rate => GimbalFlags::YAW_IN_VEHICLE_FRAME,
-        Input::AbsoluteAngle => GimbalFlags::YAW_LOCK | GimbalFlags::YAW_IN_EARTH_FRAME,
-    };
-    GimbalFlags::ROLL_LOCK | GimbalFlags::PITCH_LOCK | yaw
-}
-
-/// Latitude and longitude in degrees. In a `COMMAND_LONG` ArduPilot's clients send units of 1e-7 degrees and PX4's
-/// degrees, always both alike.
-fn coordinates(command: &Command) -> Result<[Option<f64>; 2], Refusal> {
-    let numbers = match command.form {
-        Form::Int { x, y, .. } => return Ok([Some(x), Some(y)].map(degrees_of_integer)),
-        Form::Long => [command.finite(5)?, command.finite(6)?].map(|number| number.map(f64::from)),
-    };
-    let scaled = numbers.iter().flatten().any(|number| number.abs() > COORDINATE_RANGE);
-    Ok(numbers.map(|number| number.map(|number| if scaled { number / 1e7 } else { number })))
+/// The command that a message stands for, with its mode in parameter `at`.
+fn mount_command(number: u16, at: usize, mode: u8, target: Target) -> Command {
+    let mut params = [f32::NAN; 7];
+    params[at - 1] = f32::from(mode);
+    Command { number, target, params, form: Form::Long, confirmation: 0 }
 }

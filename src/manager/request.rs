@@ -3,7 +3,7 @@
 use crate::geometry::{Angle, AngularRate, Attitude, EarthFrame, GimbalAngles};
 use crate::wire::dialect::{
     COMMAND_INT_DATA, COMMAND_LONG_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA, GIMBAL_MANAGER_SET_ATTITUDE_DATA,
-    GIMBAL_MANAGER_SET_MANUAL_CONTROL_DATA, GIMBAL_MANAGER_SET_PITCHYAW_DATA,
+    GIMBAL_MANAGER_SET_MANUAL_CONTROL_DATA, GIMBAL_MANAGER_SET_PITCHYAW_DATA, MOUNT_CONFIGURE_DATA, MOUNT_CONTROL_DATA,
 };
 use crate::wire::ids::{CommandResult, GimbalFlags, command, message};
 use crate::wire::{Frame, MavId, Target};
@@ -18,6 +18,21 @@ pub enum Request {
         demand: Demand,
     },
     Command(Command),
+    /// A v1 message to a mount: no answer is due.
+    Mount {
+        target: Target,
+        message: MountMessage,
+    },
+}
+
+/// `MOUNT_CONFIGURE` (156) or `MOUNT_CONTROL` (157).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MountMessage {
+    /// A `MAV_MOUNT_MODE`.
+    Configure { mode: u8 },
+    /// Pitch, roll and yaw in hundredths of a degree; or latitude and longitude in units of 1e-7 degrees and the altitude
+    /// above home in centimetres, as the mode has it.
+    Control { inputs: [i32; 3] },
 }
 
 /// `COMMAND_LONG` or `COMMAND_INT`.
@@ -96,12 +111,20 @@ pub fn read_request(frame: &Frame<'_>) -> Option<Result<Request, Refusal>> {
         message::GIMBAL_MANAGER_SET_MANUAL_CONTROL => {
             frame.decode().map(|message| set_manual_control(frame.target(), &message))
         }
+        message::MOUNT_CONFIGURE => frame.decode::<MOUNT_CONFIGURE_DATA>().map(|message| {
+            let message = MountMessage::Configure { mode: message.mount_mode };
+            Ok(Request::Mount { target: frame.target(), message })
+        }),
+        message::MOUNT_CONTROL => frame.decode::<MOUNT_CONTROL_DATA>().map(|message| {
+            let message = MountMessage::Control { inputs: [message.input_a, message.input_b, message.input_c] };
+            Ok(Request::Mount { target: frame.target(), message })
+        }),
         _ => None,
     };
     request.map(|request| {
         request.and_then(|request| match request {
             Request::Demand { demand, .. } => check(&demand).map(|()| request),
-            Request::Command(_) => Ok(request),
+            Request::Command(_) | Request::Mount { .. } => Ok(request),
         })
     })
 }
@@ -368,8 +391,12 @@ impl Command {
 
     /// A parameter that is a rate.
     pub fn degrees_per_second(&self, number: usize) -> Result<Option<AngularRate>, Refusal> {
-        let rate = self.finite(number)?.map(f64::from);
-        let rate = within(rate, LARGEST_RATE.to_degrees(), "rate_out_of_range")?;
+        self.finite(number)?.map_or(Ok(None), |rate| Self::checked_rate(f64::from(rate)))
+    }
+
+    /// A rate in degrees per second that a gimbal can have.
+    pub fn checked_rate(degrees_per_second: f64) -> Result<Option<AngularRate>, Refusal> {
+        let rate = within(Some(degrees_per_second), LARGEST_RATE.to_degrees(), "rate_out_of_range")?;
         Ok(rate.map(AngularRate::from_degrees_per_second))
     }
 

@@ -15,6 +15,8 @@ pub struct ControlSettings {
     pub firewall: Firewall,
     /// Honour gimbal and ROI commands addressed to the autopilot that pass through us, without acknowledging them.
     pub snoop_autopilot: bool,
+    /// Take angles of `DO_MOUNT_CONTROL` that no gimbal has for hundredths of a degree.
+    pub accept_centidegrees: bool,
     /// A (-2, -2) pair from the autopilot that holds control is a release.
     pub px4_release_quirk: bool,
     /// Tell gimbals the state of the vehicle (286) when its autopilot refuses to, or ignores the request.
@@ -31,6 +33,7 @@ impl Default for ControlSettings {
             command_rate_timeout: Duration::from_secs(10),
             firewall: Firewall::On,
             snoop_autopilot: false,
+            accept_centidegrees: false,
             px4_release_quirk: false,
             synthesize_286: true,
             roi_altitude: AltitudeReference::Auto,

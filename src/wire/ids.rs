@@ -68,6 +68,7 @@ pub mod message {
     pub const RADIO: u32 = 166;
     pub const EKF_STATUS_REPORT: u32 = 193;
     pub const ESTIMATOR_STATUS: u32 = 230;
+    pub const HOME_POSITION: u32 = 242;
     pub const MESSAGE_INTERVAL: u32 = 244;
     pub const EXTENDED_SYS_STATE: u32 = 245;
     pub const STATUSTEXT: u32 = 253;

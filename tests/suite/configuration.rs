@@ -266,6 +266,7 @@ fn numbers_have_ranges_and_kinds() {
         ("unclaimed = \"close\"", "found \"close\"; expected open or closed; did you mean closed?"),
         ("firewall = \"off\"", "found \"off\"; expected on or warn"),
         ("snoop_autopilot = \"true\"", "found \"true\"; expected true or false"),
+        ("accept_centidegrees = 100", "found 100; expected true or false"),
         ("px4_release_quirk = 1979-05-27", "found a date; expected true or false"),
         ("synthesize_286 = true", "found true; expected auto or off"),
         ("synthesize_286 = \"on\"", "found \"on\"; expected auto or off"),
@@ -542,7 +543,7 @@ fn a_wrong_variable_is_named() {
                          GIMBALD__LINK__NAME__KEY, or GIMBALD__GIMBAL__NAME__KEY";
     let lines = [
         r#"GIMBALD__CONTROL__FIREWALL: control.firewall: found "maybe"; expected on or warn"#,
-        "GIMBALD__CONTROL__LEASE_TIMEOT_S: control.lease_timeot_s: unknown key; expected one of unclaimed, lease_timeout_s, rate_timeout_s, command_rate_timeout_s, firewall, snoop_autopilot, px4_release_quirk, synthesize_286; did you mean lease_timeout_s?",
+        "GIMBALD__CONTROL__LEASE_TIMEOT_S: control.lease_timeot_s: unknown key; expected one of unclaimed, lease_timeout_s, rate_timeout_s, command_rate_timeout_s, firewall, snoop_autopilot, accept_centidegrees, px4_release_quirk, synthesize_286; did you mean lease_timeout_s?",
         "GIMBALD__GIMBAL__CAMERA__TAKEOVER: no gimbal in the file; expected a variable of a gimbal that the file has",
         &format!("GIMBALD__HTPP__LISTEN: an unknown variable; expected {KINDS}; did you mean GIMBALD__HTTP__?"),
         "GIMBALD__LINK__GROUND__MAX_RATE_HZ: link.ground.max_rate_hz: a variable for a table; expected it to be set in the file",
@@ -646,6 +647,7 @@ rate_timeout_s = 0.5
 command_rate_timeout_s = 0
 firewall = "warn"
 snoop_autopilot = true
+accept_centidegrees = true
 px4_release_quirk = true
 synthesize_286 = "off"
 [roi]
@@ -701,6 +703,7 @@ fn every_key_arrives_where_it_belongs() {
                 command_rate_timeout: Duration::ZERO,
                 firewall: Firewall::Warn,
                 snoop_autopilot: true,
+                accept_centidegrees: true,
                 px4_release_quirk: true,
                 synthesize_286: false,
                 roi_altitude: AltitudeReference::Amsl,
@@ -803,6 +806,7 @@ fn variables_override_the_file() {
         ("GIMBALD__CONTROL__COMMAND_RATE_TIMEOUT_S", "0"),
         ("GIMBALD__CONTROL__FIREWALL", "warn"),
         ("GIMBALD__CONTROL__SNOOP_AUTOPILOT", "true"),
+        ("GIMBALD__CONTROL__ACCEPT_CENTIDEGREES", "true"),
         ("GIMBALD__CONTROL__PX4_RELEASE_QUIRK", "true"),
         ("GIMBALD__CONTROL__SYNTHESIZE_286", "off"),
         ("GIMBALD__ROI__ALTITUDE_REFERENCE", "amsl"),

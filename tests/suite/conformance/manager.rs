@@ -14,6 +14,8 @@ mod control_war;
 mod events;
 mod frames;
 mod mount;
+mod mount_messages;
+mod mount_traps;
 mod outcomes;
 mod presence;
 mod radio_control;

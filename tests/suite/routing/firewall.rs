@@ -8,6 +8,8 @@ use super::*;
 use crate::support::world::{AUTOPILOT, GIMBAL};
 
 const SET_ATTITUDE: u32 = 284;
+const MOUNT_CONFIGURE: u32 = 156;
+const MOUNT_CONTROL: u32 = 157;
 
 fn rig(firewall: Firewall) -> Rig {
     let control = ControlSettings { firewall, ..ControlSettings::default() };
@@ -24,6 +26,11 @@ fn steering() -> Vec<(Vec<u8>, &'static [&'static str])> {
     let all = &["gimbal", "ground", "radio", "peer"][..];
     for (target, receivers) in [((1, 154), &["gimbal"][..]), ((1, 0), &["gimbal"]), ((0, 0), all)] {
         frames.push((addressed(AUTOPILOT, SET_ATTITUDE, target), receivers));
+        if target != (1, 0) && target != (0, 0) {
+            // What older autopilots say; to everybody no gimbal's link gets it anyway (R18).
+            frames.push((addressed(AUTOPILOT, MOUNT_CONFIGURE, target), receivers));
+            frames.push((addressed(AUTOPILOT, MOUNT_CONTROL, target), receivers));
+        }
         for number in [204, 205, 220] {
             frames.push((command(AUTOPILOT, COMMAND_LONG, number, target), receivers));
             frames.push((command(AUTOPILOT, COMMAND_INT, number, target), receivers));

@@ -8,7 +8,8 @@ use gimbald::wire::MavId;
 use gimbald::wire::dialect::{
     AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA, COMMAND_ACK_DATA, COMMAND_INT_DATA, COMMAND_LONG_DATA, CharArray,
     GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA, GIMBAL_MANAGER_SET_ATTITUDE_DATA,
-    GIMBAL_MANAGER_SET_MANUAL_CONTROL_DATA, GIMBAL_MANAGER_SET_PITCHYAW_DATA, GLOBAL_POSITION_INT_DATA, MavMessage,
+    GIMBAL_MANAGER_SET_MANUAL_CONTROL_DATA, GIMBAL_MANAGER_SET_PITCHYAW_DATA, GLOBAL_POSITION_INT_DATA,
+    MOUNT_CONFIGURE_DATA, MOUNT_CONTROL_DATA, MavMessage,
 };
 use gimbald::wire::ids::CapFlags;
 
@@ -158,6 +159,30 @@ pub fn take_control() -> MavMessage {
 /// `DO_GIMBAL_MANAGER_PITCHYAW` to the first manager for its device; degrees, degrees per second.
 pub fn pitchyaw(pitch: f32, yaw: f32, pitch_rate: f32, yaw_rate: f32, flags: f32) -> MavMessage {
     command_long(MANAGER, 1000, &[pitch, yaw, pitch_rate, yaw_rate, flags, 0.0, 154.0])
+}
+
+/// `MOUNT_CONFIGURE`, which older programs send instead of a command.
+pub fn mount_configure(target: MavId, mount_mode: u8) -> MavMessage {
+    MavMessage::MOUNT_CONFIGURE(MOUNT_CONFIGURE_DATA {
+        target_system: target.system,
+        target_component: target.component,
+        mount_mode,
+        stab_roll: 1,
+        stab_pitch: 1,
+        stab_yaw: 1,
+    })
+}
+
+/// `MOUNT_CONTROL`: pitch, roll and yaw in hundredths of a degree, or a place.
+pub fn mount_control(target: MavId, [input_a, input_b, input_c]: [i32; 3]) -> MavMessage {
+    MavMessage::MOUNT_CONTROL(MOUNT_CONTROL_DATA {
+        target_system: target.system,
+        target_component: target.component,
+        input_a,
+        input_b,
+        input_c,
+        save_position: 0,
+    })
 }
 
 /// `REQUEST_MESSAGE`.

@@ -12,8 +12,8 @@ use super::{
     with_gimbal_that,
 };
 use crate::support::script::{
-    NAN, ardupilot_heartbeat, command_int, command_long, configure, device_status, in_frame, pitch_yaw_deg, pitchyaw,
-    px4_heartbeat, roi_location, take_control, to, usual_capabilities,
+    NAN, ardupilot_heartbeat, command_int, command_long, configure, device_status, in_frame, mount_configure,
+    mount_control, pitch_yaw_deg, pitchyaw, px4_heartbeat, roi_location, take_control, to, usual_capabilities,
 };
 use crate::support::world::{AUTOPILOT, GCS, GIMBAL, MANAGER, Places, World, heartbeat, three_links};
 
@@ -99,10 +99,25 @@ fn mount_commands_to_the_autopilot_are_done() {
         (command_long(AUTOPILOT, 205, &[-20.0, 0.0, 10.0, 0.0, 0.0, 0.0, 2.0]), 44),
         (command_long(AUTOPILOT, 204, &[1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0]), 2 | 44),
         (command_int(AUTOPILOT, 205, [NAN; 4], 0, 0, 0.0), 1 | 44),
+        (command_long(AUTOPILOT, 220, &[1.0, 0.0, 0.0, 0.0]), 44),
+        (mount_configure(AUTOPILOT, 1), 2 | 44),
+        (mount_configure(AUTOPILOT, 0), 1 | 44),
     ] {
         passes_unanswered(&mut world, places, &command);
         assert_eq!(only_setpoint(&mut world, places).flags, flags, "{command:?}");
     }
+    // The messages that are older than the commands.
+    passes_unanswered(&mut world, places, &mount_configure(AUTOPILOT, 2));
+    assert_eq!(setpoints(&mut world, places), [], "to configure moves nothing");
+    passes_unanswered(&mut world, places, &mount_control(AUTOPILOT, [-2_000, 0, 1_000]));
+    let (pitch, yaw) = pitch_yaw_deg(only_setpoint(&mut world, places).q);
+    assert_near(pitch, -20.0, 0.001);
+    assert_near(yaw, 10.0, 0.001);
+    // Without the option they are the autopilot's alone.
+    let (mut world, places) = flying(false);
+    passes_unanswered(&mut world, places, &mount_control(AUTOPILOT, [-2_000, 0, 1_000]));
+    passes_unanswered(&mut world, places, &mount_configure(AUTOPILOT, 1));
+    assert_eq!(setpoints(&mut world, places), []);
 }
 
 /// The same gate as ever: what somebody else says while the gimbal is held moves nothing, and is counted.
@@ -144,7 +159,6 @@ fn what_is_not_meant_for_our_gimbal_is_not_done() {
         command_long(AUTOPILOT, 512, &[280.0]),
         command_long(AUTOPILOT, 198, &[1.0]),
         command_long(AUTOPILOT, 196, &[]),
-        command_long(AUTOPILOT, 220, &[1.0]),
         command_long(AUTOPILOT, 400, &[1.0]),
     ] {
         passes_unanswered(&mut world, places, &command);
