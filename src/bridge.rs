@@ -205,6 +205,7 @@ impl Bridge {
         bridge.router.set_own_system(bridge.identity.system());
         bridge.ranks.set_own_system(bridge.identity.system());
         bridge.timers.set(Timer::Heartbeat, now);
+        bridge.present_new(now);
         bridge
     }
 

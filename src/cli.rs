@@ -155,6 +155,7 @@ Each with a probability (drop=0.1), a duration (delay=250ms), or a time since th
 Examples:
   gimbald sim vehicle --endpoint udpout:127.0.0.1:14540
   gimbald sim vehicle --endpoint udpout:127.0.0.1:14540 --autopilot ardupilot --system-id 3
+  gimbald sim vehicle --endpoint udpout:127.0.0.1:14540 --autopilot ardupilot --gimbal-output device
 
 {ENDPOINTS}"))]
     Vehicle(SimVehicleArgs),
@@ -225,6 +226,10 @@ pub struct SimVehicleArgs {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
     pub system_id: u8,
 
+    /// How it drives a gimbal by itself
+    #[arg(long, value_name = "WAY", value_enum, default_value_t = SimulatedGimbalOutput::None)]
+    pub gimbal_output: SimulatedGimbalOutput,
+
     /// Do not send AUTOPILOT_STATE_FOR_GIMBAL_DEVICE, and refuse requests for it
     #[arg(long)]
     pub no_autopilot_state: bool,
@@ -293,6 +298,16 @@ pub enum SimulatedStatusFrame {
     Lock,
     /// As devices without frame flags: from North while yaw is locked, else from the vehicle's nose, and no delta_yaw
     Legacy,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SimulatedGimbalOutput {
+    /// Not at all; it is left to its manager on the companion
+    None,
+    /// A gimbal device of its own, as ArduPilot with MNT1_TYPE 6
+    Device,
+    /// Through a gimbal manager, as PX4 with MNT_MODE_OUT 3
+    Manager,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

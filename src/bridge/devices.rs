@@ -96,6 +96,7 @@ impl Bridge {
                 if source.system == system {
                     self.conflicts.end_foreign_system(source.component);
                 }
+                self.present_new(now);
             }
             Err(NotAdopted::Waits) => {}
             Err(NotAdopted::NoManagerLeft) => self.conflicts.note(now, Conflict::NoManagerLeft { device: source }),

@@ -48,16 +48,16 @@ impl Presented {
 }
 
 impl Bridge {
-    /// Once a second: presents gimbals that are new, and beats for all. 191's from the start, and those of the
-    /// configuration; others from when they are found.
-    pub(super) fn beat_as_presented(&mut self, now: Timestamp) {
+    /// Presents gimbals that are new: 191's from the start, and those of the configuration; others when they are found.
+    pub(super) fn present_new(&mut self, now: Timestamp) {
         if !self.presented.is_on {
             return;
         }
         let managers: Vec<u8> = self.roster.iter().map(|gimbal| gimbal.component).collect();
         for at in 0..self.roster.len() {
             let gimbal = self.roster.get_mut(at);
-            let (manager, is_wanted) = (gimbal.component, gimbal.beats() || gimbal.configured);
+            let (manager, is_wanted) =
+                (gimbal.component, gimbal.beats() || gimbal.configured || gimbal.adopted.is_some());
             if !is_wanted || self.presented.devices.iter().any(|device| device.manager == manager) {
                 continue;
             }
@@ -69,6 +69,10 @@ impl Bridge {
             }
             self.presented.devices.push(device);
         }
+    }
+
+    /// Once a second.
+    pub(super) fn beat_as_presented(&mut self, now: Timestamp) {
         self.beat_for_each_presented(now, false);
     }
 
@@ -187,6 +191,10 @@ impl Bridge {
 
     fn handle_presented_setpoint(&mut self, now: Timestamp, at: usize, place: Place, id: MavId, frame: &Frame<'_>) {
         let sender = frame.source();
+        if self.autopilot.is_none() && sender == MavId::new(id.system, component::AUTOPILOT1) {
+            // It goes on with what it did before we were started, and will be known by its heartbeat.
+            return;
+        }
         if self.autopilot != Some(sender) {
             let conflict =
                 Conflict::RivalMaster { rival: sender, device: id, autopilot: None, outcome: Outcome::KeptAway };

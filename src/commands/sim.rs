@@ -4,8 +4,8 @@ use std::io::Write;
 use std::time::Duration;
 
 use crate::cli::{
-    SimCommand, SimGimbalArgs, SimVehicleArgs, SimulatedAutopilot, SimulatedFamily, SimulatedFrames, SimulatedReports,
-    SimulatedStatusFrame,
+    SimCommand, SimGimbalArgs, SimVehicleArgs, SimulatedAutopilot, SimulatedFamily, SimulatedFrames,
+    SimulatedGimbalOutput, SimulatedReports, SimulatedStatusFrame,
 };
 use crate::daemon::clock::unix_time_us;
 use crate::endpoint::Endpoint;
@@ -19,7 +19,7 @@ use crate::sim::faults::{Faults, FaultyPeer};
 use crate::sim::host;
 use crate::sim::peer::Peer;
 use crate::sim::plant::PlantSettings;
-use crate::sim::vehicle::{Autopilot, StateForGimbals, Vehicle, VehicleSettings};
+use crate::sim::vehicle::{Autopilot, ClientVersion, GimbalOutput, StateForGimbals, Vehicle, VehicleSettings};
 use crate::timestamp::Timestamp;
 use crate::wire::ids::CapFlags;
 
@@ -106,6 +106,19 @@ fn device_settings(arguments: &SimGimbalArgs) -> DeviceSettings {
 }
 
 pub fn run_sim_vehicle(arguments: &SimVehicleArgs, errors: &mut impl Write) -> ExitCode {
+    let gimbal_output = match (arguments.gimbal_output, arguments.autopilot) {
+        (SimulatedGimbalOutput::None, _) => GimbalOutput::None,
+        (SimulatedGimbalOutput::Device, SimulatedAutopilot::ArduPilot) => GimbalOutput::Device,
+        (SimulatedGimbalOutput::Manager, SimulatedAutopilot::Px4) => GimbalOutput::Manager(ClientVersion::Merged),
+        (SimulatedGimbalOutput::Device | SimulatedGimbalOutput::Manager, _) => {
+            // The exit code says it too; nobody is left to tell when the reader is gone.
+            let _ = writeln!(
+                errors,
+                "gimbald sim vehicle: --gimbal-output: ardupilot drives a device, and px4 asks a manager"
+            );
+            return ExitCode::Usage;
+        }
+    };
     let settings = VehicleSettings {
         autopilot: match arguments.autopilot {
             SimulatedAutopilot::Px4 => Autopilot::Px4,
@@ -116,6 +129,7 @@ pub fn run_sim_vehicle(arguments: &SimVehicleArgs, errors: &mut impl Write) -> E
             true => StateForGimbals::Denied,
             false => StateForGimbals::Told,
         },
+        gimbal_output,
         uptime: Duration::ZERO,
         unix_time_us: unix_time_us(),
     };
@@ -177,6 +191,21 @@ mod tests {
         let limited = settings(&["--yaw-range", "160"]);
         assert_eq!(limited.plant.limits.yaw, AxisLimits::new(Angle::from_degrees(-160.0), Angle::from_degrees(160.0)));
         assert_eq!(limited.capabilities, usual.capabilities.difference(CapFlags::SUPPORTS_INFINITE_YAW));
+    }
+
+    /// ArduPilot asks no manager, and PX4 in that mode drives no device.
+    #[test]
+    fn an_autopilot_that_cannot_drive_a_gimbal_so_is_a_usage_error() {
+        for (autopilot, output) in [("ardupilot", "manager"), ("px4", "device")] {
+            let line = ["gimbald", "sim", "vehicle", "--endpoint", "udpin:127.0.0.1:0", "--autopilot", autopilot];
+            let line = line.into_iter().chain(["--gimbal-output", output]);
+            let Ok(Cli { command: Command::Sim(command), .. }) = Cli::try_parse_from(line) else { panic!("it parses") };
+            let mut errors = Vec::new();
+
+            assert_eq!(sim(&command, &mut errors), ExitCode::Usage);
+            let said = String::from_utf8(errors).expect("text");
+            assert!(said.starts_with("gimbald sim vehicle: --gimbal-output: ardupilot drives a device"), "{said}");
+        }
     }
 
     /// "78 configuration, 64 usage": a fault that does not exist is a wrong argument.

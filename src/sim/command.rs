@@ -14,11 +14,14 @@ pub struct Command {
     pub number: u16,
     /// `param1` to `param7`; `COMMAND_INT` gives x, y, z in the last three.
     pub params: [f64; 7],
+    /// It was a `COMMAND_INT`, whose x and y are integers.
+    pub is_int: bool,
 }
 
 impl Command {
     /// The command in `frame`; `None` if there is none.
     pub fn read(frame: &Frame<'_>) -> Option<Self> {
+        let is_int = frame.message_id() == message::COMMAND_INT;
         let (number, params) = match frame.message_id() {
             message::COMMAND_LONG => {
                 let long: COMMAND_LONG_DATA = frame.decode()?;
@@ -33,7 +36,7 @@ impl Command {
             }
             _ => return None,
         };
-        Some(Self { sender: frame.source(), target: frame.target(), number, params })
+        Some(Self { sender: frame.source(), target: frame.target(), number, params, is_int })
     }
 
     /// Whether the command is for one component alone, so that it must be answered.

@@ -1,16 +1,24 @@
 //! A simulated autopilot, circling, that QGroundControl and MAVSDK take for a vehicle.
 //!
 //! It sends what PX4 or ArduPilot sends at similar rates, and answers what a ground station asks before it shows a
-//! vehicle: version, parameters, mission, fence and rally points. It has no gimbal manager of its own.
+//! vehicle: version, parameters, mission, fence and rally points. It drives no gimbal unless it is told to, as ArduPilot
+//! drives a gimbal device ([`mount`]), or as PX4 asks a gimbal manager ([`manager_client`]).
 
 mod answers;
 mod flight;
+mod manager_client;
+mod mount;
 mod parameters;
 mod telemetry;
 
 use std::time::Duration;
 
+pub use manager_client::ClientVersion;
+
 pub use flight::{HEIGHT_M, HOME, Motion, RADIUS_M, SPEED_MPS};
+
+use manager_client::ManagerClient;
+use mount::Mount;
 
 use crate::sim::component::{Component, Line};
 use crate::sim::parameters::{ParameterServer, ParameterValue};
@@ -40,12 +48,23 @@ pub enum StateForGimbals {
     Promised,
 }
 
+/// How it drives a gimbal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GimbalOutput {
+    None,
+    /// ArduPilot with `MNT1_TYPE` 6: a gimbal device of its own.
+    Device,
+    /// PX4 with `MNT_MODE_OUT` 3: through an external manager.
+    Manager(ClientVersion),
+}
+
 /// Everything that differs from one simulated vehicle to another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VehicleSettings {
     pub autopilot: Autopilot,
     pub system_id: u8,
     pub state_for_gimbals: StateForGimbals,
+    pub gimbal_output: GimbalOutput,
     /// What its clock reads when it is started; it reads on from zero after a reboot.
     pub uptime: Duration,
     /// Microseconds since 1970 when `now` is zero; unknown when `None`.
@@ -58,6 +77,7 @@ impl Default for VehicleSettings {
             autopilot: Autopilot::Px4,
             system_id: 1,
             state_for_gimbals: StateForGimbals::Told,
+            gimbal_output: GimbalOutput::None,
             uptime: Duration::ZERO,
             unix_time_us: None,
         }
@@ -72,6 +92,8 @@ pub struct Vehicle {
     line: Line,
     streams: Streams,
     parameters: ParameterServer,
+    mount: Option<Mount>,
+    client: Option<ManagerClient>,
     is_armed: bool,
     custom_mode: u32,
 }
@@ -82,11 +104,26 @@ impl Vehicle {
         for (id, usual) in telemetry::usual_streams(settings.autopilot, settings.state_for_gimbals) {
             streams.add(id, usual, now);
         }
+        let (mount, client) = match settings.gimbal_output {
+            GimbalOutput::None => (None, None),
+            GimbalOutput::Device => (Some(Mount::new()), None),
+            GimbalOutput::Manager(version) => (None, Some(ManagerClient::new(version))),
+        };
+        let on_request: &[u32] = match settings.gimbal_output {
+            GimbalOutput::None => &[],
+            GimbalOutput::Device => &mount::REPORTS,
+            GimbalOutput::Manager(_) => &[message::GIMBAL_MANAGER_SET_PITCHYAW],
+        };
+        for id in on_request {
+            streams.add(*id, None, now);
+        }
         Self {
             boot: now,
             line: Line::new(MavId::new(settings.system_id, telemetry::COMPONENT)),
             streams,
-            parameters: parameters::parameters(settings.autopilot, settings.system_id),
+            parameters: parameters::parameters(settings.autopilot, settings.system_id, settings.gimbal_output),
+            mount,
+            client,
             is_armed: true,
             custom_mode: match settings.autopilot {
                 // Main mode auto, sub mode loiter.
@@ -147,6 +184,8 @@ impl Component for Vehicle {
     fn advance(&mut self, _now: Timestamp) {}
 
     fn handle_frame(&mut self, now: Timestamp, frame: &Frame<'_>) {
+        self.hear_for_mount(now, frame);
+        self.hear_for_client(now, frame);
         if frame.target().includes(self.id()) {
             self.handle_request(now, frame);
         }
@@ -156,11 +195,19 @@ impl Component for Vehicle {
         while let Some(id) = self.streams.pop_due(now) {
             self.report(now, id);
         }
+        self.ask_for_mount(now);
+        self.repeat_claim(now);
         self.parameters.handle_timeout(now, &mut self.line.outbox);
     }
 
     fn next_due(&self) -> Option<Timestamp> {
-        [self.streams.poll_timeout(), self.parameters.poll_timeout()].into_iter().flatten().min()
+        let timers = [
+            self.streams.poll_timeout(),
+            self.parameters.poll_timeout(),
+            self.mount.as_ref().and_then(Mount::poll_timeout),
+            self.client.as_ref().and_then(ManagerClient::poll_timeout),
+        ];
+        timers.into_iter().flatten().min()
     }
 
     fn restart(&mut self, now: Timestamp) {

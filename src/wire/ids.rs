@@ -207,6 +207,7 @@ pub mod mav_state {
 pub mod severity {
     pub const WARNING: u8 = 4;
     pub const NOTICE: u8 = 5;
+    pub const INFO: u8 = 6;
 }
 
 /// `MAV_DATA_STREAM`.

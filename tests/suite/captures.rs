@@ -14,6 +14,7 @@ use gimbald::wire::{DatagramFrames, StreamDecoder, WireCounters};
 
 use self::core::Gimbal;
 use crate::support::tlog;
+use crate::support::world::{AUTOPILOT, GIMBAL};
 
 /// A link of a recording: its name, how many frames it carried, and how many of them of unknown messages.
 type Link = (&'static str, u64, u64);
@@ -94,6 +95,32 @@ fn a_recorded_flight_goes_through_the_core() {
         let named = |setting: &&str| remedies.iter().any(|remedy| remedy.contains(*setting));
         assert!(settings.iter().all(named) && settings.is_empty() == remedies.is_empty(), "{capture}: {remedies:?}");
         assert_expected(capture, Part::Core, &lines);
+    }
+}
+
+/// `[autopilot] present_device` under a recorded ArduPilot: its constant stream moves nothing and its 286 goes on, the ground
+/// sees one manager, and there is nothing to complain of.
+#[test]
+fn a_recorded_ardupilot_drives_the_presented_device() {
+    for (recording, gimbal) in [("gimbal", Gimbal::Simulated), ("ground", Gimbal::Recorded)] {
+        let replay = core::replay_with("ap_gremsy_a", recording, gimbal, true);
+
+        replay.assert_everything_was_read();
+        replay.assert_gimbals_hear_the_autopilot();
+        replay.assert_the_gimbal_is_left_alone();
+        replay.assert_our_manager_is_consistent();
+        assert_eq!(replay.snapshot.conflicts, [""; 0], "{recording}");
+        assert_eq!(replay.snapshot.links[1].dropped.get("firewall"), None, "{recording}");
+        // Each of its words as a manager was kept here, and each of the gimbal's from it.
+        let as_manager = [280, 281, 283, 285];
+        assert_eq!(replay.heard_on("ground", AUTOPILOT, &as_manager), 0, "{recording}");
+        let kept = replay.snapshot.links[0].dropped.get("autopilots_gimbal").copied().unwrap_or(0);
+        assert_eq!(kept, replay.said_by_autopilot(&as_manager) as u64, "{recording}");
+        assert!(replay.heard_on("ground", GIMBAL, &as_manager) > 100, "{recording}");
+        let presented = replay.snapshot.gimbals[0].presented.as_ref().expect("it is presented");
+        let streams = if recording == "gimbal" { "steady" } else { "silent" };
+        assert_eq!((presented.device.as_str(), presented.stream.as_str()), ("1/154", streams));
+        assert!(replay.heard_on("autopilot", GIMBAL, &[0]) > 10, "{recording}");
     }
 }
 

@@ -61,6 +61,8 @@ impl Vehicle {
             self.handle_timesync(now, sender, &timesync);
         } else if let Some(ping) = frame.decode() {
             self.handle_ping(sender, &ping);
+        } else if let Some(demand) = frame.decode() {
+            self.set_pitchyaw_for_mount(&demand);
         } else if let Some(request) = frame.decode() {
             self.handle_request_data_stream(now, &request);
         } else if let Some(mode) = frame.decode::<SET_MODE_DATA>() {
@@ -72,6 +74,11 @@ impl Vehicle {
     }
 
     fn handle_command(&mut self, now: Timestamp, command: &Command) {
+        let driven = self.command_mount(now, command).or_else(|| self.command_client(now, command));
+        if let Some(result) = driven {
+            command.acknowledge(&mut self.line.outbox, result);
+            return;
+        }
         let asks_for_message = matches!(command.number, command::REQUEST_MESSAGE | command::SET_MESSAGE_INTERVAL);
         if asks_for_message && self.ignores(command.message_id()) {
             return;
@@ -137,14 +144,14 @@ impl Vehicle {
         }
     }
 
-    /// Messages that ArduPilot knows how to send once it has a mount.
+    /// Messages that ArduPilot knows how to send once it has a mount, which it has not.
     fn is_mount_message(&self, id: u32) -> bool {
         let known = [
             message::GIMBAL_MANAGER_INFORMATION,
             message::GIMBAL_MANAGER_STATUS,
             message::GIMBAL_DEVICE_ATTITUDE_STATUS,
         ];
-        self.settings.autopilot == Autopilot::ArduPilot && known.contains(&id)
+        self.settings.autopilot == Autopilot::ArduPilot && self.mount.is_none() && known.contains(&id)
     }
 
     fn handle_mission_request_list(&mut self, sender: MavId, request: &MISSION_REQUEST_LIST_DATA) {

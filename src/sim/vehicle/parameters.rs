@@ -1,10 +1,16 @@
 //! The few parameters of a simulated autopilot: those by which ground stations know it and find it set up.
 
-use super::Autopilot;
+use super::{Autopilot, GimbalOutput};
 use crate::sim::parameters::ParameterValue::{Float, Integer};
 use crate::sim::parameters::{IntegerEncoding, ParameterServer};
 
-pub(super) fn parameters(autopilot: Autopilot, system: u8) -> ParameterServer {
+pub(super) fn parameters(autopilot: Autopilot, system: u8, output: GimbalOutput) -> ParameterServer {
+    // Where it drives none, the gimbal is left to its manager on the companion.
+    let (mount_type, mode_in, mode_out) = match output {
+        GimbalOutput::None => (0, -1, 0),
+        GimbalOutput::Device => (6, -1, 0),
+        GimbalOutput::Manager(_) => (0, 0, 3),
+    };
     let system = Integer(i32::from(system));
     match autopilot {
         Autopilot::Px4 => ParameterServer::new(
@@ -20,9 +26,8 @@ pub(super) fn parameters(autopilot: Autopilot, system: u8) -> ParameterServer {
                 ("MAV_SYS_ID", system),
                 ("MAV_TYPE", Integer(2)),
                 ("MIS_TAKEOFF_ALT", Float(10.0)),
-                // The gimbal is left to its manager on the companion.
-                ("MNT_MODE_IN", Integer(-1)),
-                ("MNT_MODE_OUT", Integer(0)),
+                ("MNT_MODE_IN", Integer(mode_in)),
+                ("MNT_MODE_OUT", Integer(mode_out)),
                 ("NAV_DLL_ACT", Integer(0)),
                 ("NAV_RCL_ACT", Integer(2)),
                 ("RTL_RETURN_ALT", Float(30.0)),
@@ -49,8 +54,7 @@ pub(super) fn parameters(autopilot: Autopilot, system: u8) -> ParameterServer {
                 ("INS_ACCOFFS_X", Float(0.001)),
                 ("INS_ACCOFFS_Y", Float(0.001)),
                 ("INS_ACCOFFS_Z", Float(0.001)),
-                // The gimbal is left to its manager on the companion.
-                ("MNT1_TYPE", Integer(0)),
+                ("MNT1_TYPE", Integer(mount_type)),
                 ("RTL_ALT", Integer(1500)),
                 ("SYSID_MYGCS", Integer(255)),
                 ("SYSID_THISMAV", system),

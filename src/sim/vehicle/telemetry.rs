@@ -259,7 +259,8 @@ impl Vehicle {
                 spec_version_hash: [0; 8],
                 library_version_hash: [0; 8],
             }),
-            _ => return false,
+            message::GIMBAL_MANAGER_SET_PITCHYAW => return self.demand_of_client(now),
+            id => return self.report_of_mount(now, id),
         }
         true
     }

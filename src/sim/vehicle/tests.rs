@@ -6,6 +6,9 @@ use crate::wire::dialect::*;
 use crate::wire::ids::{command, message};
 use crate::wire::{DatagramFrames, encode_to_vec};
 
+mod manager_client;
+mod mount;
+
 const GCS: MavId = MavId::new(255, 190);
 
 /// A vehicle in simulated time, and what it said since it was last asked.
@@ -45,6 +48,13 @@ impl Flight {
         self.vehicle.handle_received(self.now, &encode_to_vec(GCS, 0, message));
         self.drain();
         std::mem::take(&mut self.sent).into_iter().map(|(_, bytes)| bytes).collect()
+    }
+
+    /// A message of somebody, between two streamed ones.
+    fn hear<M: MessageData>(&mut self, source: MavId, message: &M) {
+        self.run_for(1);
+        self.vehicle.handle_received(self.now, &encode_to_vec(source, 0, message));
+        self.drain();
     }
 
     fn count(&self, id: u32) -> usize {

@@ -2,10 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use gimbald::bridge::settings::Settings;
 use gimbald::bridge::snapshot::Snapshot;
 use gimbald::config;
 use gimbald::gimbals::mavlink_v2::sim::{Device, DeviceSettings, SystemId};
 use gimbald::timestamp::Timestamp;
+use gimbald::wire::MavId;
 use gimbald::wire::dialect::{COMMAND_LONG_DATA, GIMBAL_MANAGER_STATUS_DATA};
 use gimbald::wire::ids::message;
 use serde_json::json;
@@ -36,10 +38,15 @@ pub struct Replay {
 
 /// Plays a recording in: each frame on the link of its source, at its time.
 pub fn replay(capture: &str, recording: &'static str, gimbal: Gimbal) -> Replay {
+    replay_with(capture, recording, gimbal, false)
+}
+
+/// The same, with the gimbal presented to the autopilot or not.
+pub fn replay_with(capture: &str, recording: &'static str, gimbal: Gimbal, present_device: bool) -> Replay {
     let folder = tlog::capture(capture);
     let settings = config::load(&folder.join("config.toml"), std::iter::empty())
         .unwrap_or_else(|problems| panic!("{capture}: {problems}"));
-    let (mut world, places) = World::new(settings.core);
+    let (mut world, places) = World::new(Settings { present_device, ..settings.core });
     let [autopilot, device, ground]: [Place; 3] = places.try_into().expect("three links");
     if gimbal == Gimbal::Simulated {
         let settings = DeviceSettings { system_id: SystemId::Fixed(1), ..DeviceSettings::default() };
@@ -173,6 +180,19 @@ impl Replay {
                 assert_eq!((told.gimbal_device_id, holders), (154, [0; 4]));
             }
         }
+    }
+
+    /// What came out on a link, from that source and with one of these ids.
+    pub fn heard_on(&self, link: &str, source: MavId, ids: &[u32]) -> usize {
+        self.heard[link].iter().filter(|arrival| arrival.source() == source && ids.contains(&arrival.id())).count()
+    }
+
+    /// What the autopilot said with one of these ids after our system id was settled.
+    pub fn said_by_autopilot(&self, ids: &[u32]) -> usize {
+        let settled = self.heard["autopilot"].first().expect("our heartbeat").at;
+        let said = self.records.iter().filter(|record| record.at >= settled && record.source() == AUTOPILOT);
+        said.filter(|record| ids.contains(&u32::from_le_bytes([record.bytes[7], record.bytes[8], record.bytes[9], 0])))
+            .count()
     }
 
     fn recorded_from(&self, link: &str) -> u64 {

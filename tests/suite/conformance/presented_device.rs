@@ -1,6 +1,7 @@
 //! `[autopilot] present_device` (D18): the gimbal as a device of the autopilot, which ArduPilot drives with `MNT1_TYPE` = 6.
 
 mod arbitration;
+mod ardupilot;
 mod kept_apart;
 
 use std::time::Duration;
