@@ -49,8 +49,8 @@ pub fn load(path: &Path, environment: impl Iterator<Item = (String, String)>) ->
     environment::apply(&mut root, overrides, &mut problems);
 
     let configuration = schema::read(root, &mut problems);
-    checks::check(&configuration, &mut problems);
-    if problems.is_empty() { Ok(settings::build(configuration, directories)) } else { Err(in_file(problems)) }
+    let token = checks::check(&configuration, &mut problems);
+    if problems.is_empty() { Ok(settings::build(configuration, token, directories)) } else { Err(in_file(problems)) }
 }
 
 /// The variables of this process; bytes that are no UTF-8 become U+FFFD, which no setting accepts.

@@ -1,12 +1,16 @@
-//! The read-only window: the state of the daemon as a page for people and as JSON for programs.
+//! The window: the state of the daemon as a page for people and as JSON for programs, and what is asked of gimbals.
 //!
 //! Runs on a thread of its own, so that nothing a browser does delays a frame. It sees the core through a
-//! [`CoreHandle`] only: it asks for a snapshot and shows the one that the core publishes.
+//! [`CoreHandle`] only: it asks for a snapshot and shows the one that the core publishes, and gives on what is asked.
+//! Reading needs no token; control does ([`control`]).
 
 #[cfg(test)]
 pub(crate) mod canned;
+mod control;
 mod fresh;
+mod gimbals;
 mod hosts;
+mod openapi;
 mod page;
 pub mod readiness;
 mod routes;
@@ -28,5 +32,5 @@ pub fn spawn(settings: HttpSettings, core: CoreHandle) -> io::Result<JoinHandle<
     let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build()?;
     std::thread::Builder::new()
         .name("http".to_owned())
-        .spawn(move || runtime.block_on(server::run(settings.listen, core, server::Limits::default())))
+        .spawn(move || runtime.block_on(server::run(settings, core, server::Limits::default())))
 }

@@ -2,6 +2,7 @@
 //!
 //! `docs/architecture.md` tells how the parts fit together.
 
+pub mod actions;
 pub mod bridge;
 pub mod channel;
 pub mod cli;
@@ -19,5 +20,6 @@ pub mod router;
 pub mod sim;
 pub mod timers;
 pub mod timestamp;
+pub mod token;
 pub mod vehicle;
 pub mod wire;

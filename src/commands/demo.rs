@@ -119,7 +119,7 @@ fn daemon_settings(arguments: &DemoArgs, gimbal: Endpoint, autopilot: SocketAddr
     DaemonSettings {
         core: Settings { links, gimbals, ..Settings::default() },
         endpoints: all.into_iter().map(|(_, _, endpoint)| endpoint).collect(),
-        http: Some(HttpSettings { listen: arguments.http, token_file: None }),
+        http: Some(HttpSettings { listen: arguments.http, token: None }),
         // A simulated vehicle's id is not worth keeping.
         directories: Directories::default(),
     }

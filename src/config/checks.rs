@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::net::{IpAddr, SocketAddr};
-use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
 
 use crate::bridge::settings::Role;
 use crate::channel::ChannelId;
 use crate::endpoint::Endpoint;
+use crate::token::Token;
 
 use super::environment::spelling;
 use super::numbering;
@@ -21,7 +21,8 @@ use super::suggestion;
 /// The most links there may be. As many channels again are left for peers of links that have several.
 const MAX_LINKS: usize = ChannelId::COUNT / 2;
 
-pub(super) fn check(configuration: &Configuration, problems: &mut Vec<Problem>) {
+/// Gives the token for control over HTTP, where a file of one is named.
+pub(super) fn check(configuration: &Configuration, problems: &mut Vec<Problem>) -> Option<Token> {
     let Configuration { links, gimbals, autopilot, http, .. } = configuration;
     // A link section of the wrong kind has been reported.
     if links.is_empty() && !problems.iter().any(|problem| problem.key == "link") {
@@ -59,7 +60,7 @@ pub(super) fn check(configuration: &Configuration, problems: &mut Vec<Problem>) 
     numbering::check(gimbals, presents.is_some(), problems);
     // Every endpoint is compared with every other: not with those that cannot stay.
     check_endpoints(&links[..links.len().min(MAX_LINKS)], http, problems);
-    check_token_file(http, problems);
+    read_token(http, problems)
 }
 
 /// Names differ in more than a variable can tell.
@@ -144,16 +145,14 @@ fn same_port(a: SocketAddr, b: SocketAddr) -> bool {
 }
 
 /// Whoever can read the token can steer the gimbal.
-fn check_token_file(http: &Http, problems: &mut Vec<Problem>) {
-    const EXPECTED: &str = "a file that only its owner can read: chmod 0600";
-    let Some(file) = &http.token_file else { return };
-    // A token that is not there yet locks everybody out, which is safe.
-    let Ok(metadata) = fs::metadata(&file.value) else { return };
-    let mode = metadata.permissions().mode() & 0o7777;
-    if !metadata.is_file() {
-        problems.push(file.problem(format!("found {}, which is no file", file.shown), EXPECTED));
-    } else if mode & 0o077 != 0 {
-        problems.push(file.problem(format!("found {}, which has mode {mode:04o}", file.shown), EXPECTED));
+fn read_token(http: &Http, problems: &mut Vec<Problem>) -> Option<Token> {
+    let file = http.token_file.as_ref()?;
+    match Token::read_guarded(&file.value) {
+        Ok(token) => Some(token),
+        Err(error) => {
+            problems.push(file.problem(format!("found {}, which {error}", file.shown), Token::EXPECTED));
+            None
+        }
     }
 }
 

@@ -9,6 +9,7 @@ use crate::endpoint::Endpoint;
 use crate::gimbals::mavlink_v1::config::V1Settings;
 use crate::gimbals::settings::GimbalSettings;
 use crate::manager::settings::ControlSettings;
+use crate::token::Token;
 
 use super::reader::Located;
 use super::schema::{Configuration, Control, Gimbal, Http, Link, Roi};
@@ -35,8 +36,8 @@ pub struct Directories {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct HttpSettings {
     pub listen: SocketAddr,
-    /// Holds the bearer token for requests that control a gimbal. HTTP is read-only in this version.
-    pub token_file: Option<PathBuf>,
+    /// Who has it may control gimbals; without one nobody may.
+    pub token: Option<Token>,
 }
 
 impl HttpSettings {
@@ -45,7 +46,7 @@ impl HttpSettings {
 }
 
 /// Turns a configuration without problems into settings; unset keys get their defaults here.
-pub(super) fn build(configuration: Configuration, directories: Directories) -> DaemonSettings {
+pub(super) fn build(configuration: Configuration, token: Option<Token>, directories: Directories) -> DaemonSettings {
     let Configuration { vehicle, links, gimbals, autopilot, control, roi, http } = configuration;
     let (links, endpoints): (Vec<LinkSettings>, Vec<Endpoint>) = links.into_iter().map(link).unzip();
     let gimbals = gimbals.into_iter().map(|entry| gimbal(entry, &links)).collect();
@@ -60,7 +61,7 @@ pub(super) fn build(configuration: Configuration, directories: Directories) -> D
             present_device: value_or(autopilot.present_device, Settings::default().present_device),
         },
         endpoints,
-        http: Some(self::http(http)),
+        http: Some(self::http(http, token)),
         directories,
     }
 }
@@ -132,9 +133,6 @@ fn control(control: Control, roi: Roi) -> ControlSettings {
     }
 }
 
-fn http(http: Http) -> HttpSettings {
-    HttpSettings {
-        listen: value_or(http.listen, HttpSettings::DEFAULT_LISTEN),
-        token_file: http.token_file.map(|file| file.value),
-    }
+fn http(http: Http, token: Option<Token>) -> HttpSettings {
+    HttpSettings { listen: value_or(http.listen, HttpSettings::DEFAULT_LISTEN), token }
 }

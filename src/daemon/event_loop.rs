@@ -159,6 +159,8 @@ impl EventLoop {
                 Poll::Ready(Some(CoreRequest::Refresh)) => {
                     self.window.snapshots.send_replace(Arc::new(self.core.snapshot(now)));
                 }
+                // Who has given up is told that it was not done: so it is not.
+                Poll::Ready(Some(CoreRequest::Ask { answer, .. })) if answer.is_closed() => {}
                 Poll::Ready(Some(CoreRequest::Ask { gimbal, asked, answer })) => {
                     let id = self.ports.askers.wait(answer);
                     self.input(now, Input::Asked { id, gimbal: &gimbal, asked: &asked });

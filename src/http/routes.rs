@@ -1,55 +1,88 @@
 //! What the window answers.
 
+use std::borrow::Cow;
 use std::net::SocketAddr;
 use std::time::Duration;
 
 use axum::extract::{Request, State};
-use axum::http::header::{ALLOW, CACHE_CONTROL, CONTENT_SECURITY_POLICY, REFERRER_POLICY, X_CONTENT_TYPE_OPTIONS};
+use axum::http::header::{
+    CACHE_CONTROL, CONTENT_SECURITY_POLICY, REFERRER_POLICY, WWW_AUTHENTICATE, X_CONTENT_TYPE_OPTIONS,
+};
 use axum::http::{HeaderName, HeaderValue, StatusCode};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
-use axum::routing::get;
+use axum::routing::{get, post};
 use axum::{Json, Router};
 use serde::Serialize;
 
+use super::control::{self, Controls};
 use super::fresh::FreshSnapshots;
 use super::hosts::Listening;
 use super::page::page;
 use super::readiness::Readiness;
+use super::{gimbals, openapi};
+use crate::actions::ACTIONS;
 
-const STATUS_DEADLINE: Duration = Duration::from_millis(500);
+pub const STATUS_DEADLINE: Duration = Duration::from_millis(500);
 const HEALTH_DEADLINE: Duration = Duration::from_secs(1);
 
-/// The routes of a window that listens on `listen`.
-pub fn router(snapshots: FreshSnapshots, listen: SocketAddr) -> Router {
-    Router::new()
-        .route("/", get(page))
-        .route("/api/v1/status", get(status))
-        .route("/healthz", get(healthz))
-        .route("/readyz", get(readyz))
-        .fallback(unknown_path)
-        .method_not_allowed_fallback(read_only)
-        .layer(from_fn_with_state(Listening(listen), guard))
-        .with_state(snapshots)
+/// What the handlers share.
+#[derive(Clone)]
+pub struct Window {
+    pub snapshots: FreshSnapshots,
+    pub controls: Controls,
 }
 
-async fn status(State(snapshots): State<FreshSnapshots>) -> Response {
-    match snapshots.within(STATUS_DEADLINE).await {
+/// The routes of a window that listens on `listen`.
+pub fn router(window: Window, listen: SocketAddr) -> Router {
+    let mut router = Router::new()
+        .route("/", get(page))
+        .route("/api/v1/status", get(status))
+        .route("/api/v1/openapi.json", get(openapi))
+        .route(GIMBALS, get(gimbals::names))
+        .route(&of_gimbal(""), get(gimbals::gimbal))
+        .route(&of_gimbal("/parameters/{parameter}"), get(gimbals::parameter))
+        .route("/healthz", get(healthz))
+        .route("/readyz", get(readyz));
+    for (part, _) in gimbals::PARTS {
+        let handler = move |State(window): State<Window>, name| gimbals::part(window, part, name);
+        router = router.route(&of_gimbal(&format!("/{part}")), get(handler));
+    }
+    for action in ACTIONS {
+        let handler =
+            move |State(window): State<Window>, params, request| control::act(window, action, params, request);
+        router = router.route(&of_gimbal(&format!("/{}", action.path)), post(handler));
+    }
+    router
+        .fallback(unknown_path)
+        .method_not_allowed_fallback(other_method)
+        .layer(from_fn_with_state(Listening(listen), guard))
+        .with_state(window)
+}
+
+pub const GIMBALS: &str = "/api/v1/gimbals";
+
+fn of_gimbal(rest: &str) -> String {
+    format!("{GIMBALS}/{{name}}{rest}")
+}
+
+async fn status(State(window): State<Window>) -> Response {
+    match window.snapshots.within(STATUS_DEADLINE).await {
         Some(snapshot) => Json(snapshot.as_ref()).into_response(),
-        None => refusal(StatusCode::SERVICE_UNAVAILABLE, "the core did not answer within 500 ms"),
+        None => Refusal::new(StatusCode::SERVICE_UNAVAILABLE, "the core did not answer within 500 ms").into_response(),
     }
 }
 
 /// The process is alive, and its loop turns.
-async fn healthz(State(snapshots): State<FreshSnapshots>) -> Response {
-    match snapshots.within(HEALTH_DEADLINE).await {
+async fn healthz(State(window): State<Window>) -> Response {
+    match window.snapshots.within(HEALTH_DEADLINE).await {
         Some(_) => "ok".into_response(),
-        None => refusal(StatusCode::SERVICE_UNAVAILABLE, "the core did not answer within 1 s"),
+        None => Refusal::new(StatusCode::SERVICE_UNAVAILABLE, "the core did not answer within 1 s").into_response(),
     }
 }
 
-async fn readyz(State(snapshots): State<FreshSnapshots>) -> Response {
-    let readiness = match snapshots.within(STATUS_DEADLINE).await {
+async fn readyz(State(window): State<Window>) -> Response {
+    let readiness = match window.snapshots.within(STATUS_DEADLINE).await {
         Some(snapshot) => Readiness::of(&snapshot),
         None => Readiness::unknown("the core did not answer within 500 ms"),
     };
@@ -57,14 +90,20 @@ async fn readyz(State(snapshots): State<FreshSnapshots>) -> Response {
     (status, Json(readiness)).into_response()
 }
 
-async fn unknown_path() -> Response {
-    refusal(StatusCode::NOT_FOUND, "no such page; there are /, /api/v1/status, /healthz and /readyz")
+async fn openapi() -> Response {
+    Json(openapi::description()).into_response()
 }
 
-async fn read_only() -> Response {
-    let mut response = refusal(StatusCode::METHOD_NOT_ALLOWED, "this window is read-only: use GET");
-    response.headers_mut().insert(ALLOW, HeaderValue::from_static("GET, HEAD"));
-    response
+async fn unknown_path() -> Response {
+    Refusal::new(
+        StatusCode::NOT_FOUND,
+        "no such page; there are /, /api/v1/status, /api/v1/gimbals, /api/v1/openapi.json, /healthz and /readyz",
+    )
+    .into_response()
+}
+
+async fn other_method() -> Response {
+    Refusal::new(StatusCode::METHOD_NOT_ALLOWED, "another method is needed here; Allow says which").into_response()
 }
 
 /// Checks who is asked for, and says how far each answer may be trusted.
@@ -72,7 +111,7 @@ async fn guard(State(listening): State<Listening>, request: Request, next: Next)
     let (parts, body) = request.into_parts();
     let mut response = match listening.check_host(&parts) {
         Ok(()) => next.run(Request::from_parts(parts, body)).await,
-        Err((status, why)) => refusal(status, why),
+        Err((status, why)) => Refusal::new(status, why).into_response(),
     };
     let headers = response.headers_mut();
     headers.insert(CACHE_CONTROL, HeaderValue::from_static("no-store"));
@@ -87,11 +126,33 @@ async fn guard(State(listening): State<Listening>, request: Request, next: Next)
 const SAME_ORIGIN: HeaderName = HeaderName::from_static("cross-origin-resource-policy");
 const NOTHING_IS_LOADED: HeaderValue = HeaderValue::from_static("default-src 'none'; frame-ancestors 'none'");
 
+/// Why something was not done, or is not there.
 #[derive(Serialize)]
-struct Refusal {
-    error: &'static str,
+pub struct Refusal {
+    #[serde(skip)]
+    pub status: StatusCode,
+    /// For people.
+    pub error: Cow<'static, str>,
+    /// A word for programs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<&'static str>,
+    /// Who has control, where that is why.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub holder: Option<String>,
 }
 
-fn refusal(status: StatusCode, error: &'static str) -> Response {
-    (status, Json(Refusal { error })).into_response()
+impl Refusal {
+    pub fn new(status: StatusCode, error: impl Into<Cow<'static, str>>) -> Self {
+        Self { status, error: error.into(), reason: None, holder: None }
+    }
+}
+
+impl IntoResponse for Refusal {
+    fn into_response(self) -> Response {
+        let mut response = (self.status, Json(&self)).into_response();
+        if self.status == StatusCode::UNAUTHORIZED {
+            response.headers_mut().insert(WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
+        }
+        response
+    }
 }

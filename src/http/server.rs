@@ -19,9 +19,12 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::{sleep, timeout};
 use tracing::{debug, info, warn};
 
+use super::control::Controls;
 use super::fresh::FreshSnapshots;
-use super::routes;
+use super::routes::{self, Window};
+use crate::config::settings::HttpSettings;
 use crate::daemon::window::CoreHandle;
+use crate::token::Token;
 
 /// Connections that the kernel holds until they are accepted.
 const BACKLOG: u32 = 64;
@@ -38,9 +41,11 @@ pub struct Limits {
     pub connections: usize,
     /// From the end of one answer, or from connecting, to the end of the next request's headers.
     pub header: Duration,
+    /// From the end of the headers to the end of the body.
+    pub body: Duration,
     /// After so long a connection is closed at its next answer.
     pub lifetime: Duration,
-    /// How long that answer may take to be read.
+    /// How long that answer may take to come and be read.
     pub farewell: Duration,
 }
 
@@ -50,25 +55,30 @@ impl Default for Limits {
             retry: Duration::from_secs(2),
             connections: 32,
             header: Duration::from_secs(5),
+            body: Duration::from_secs(5),
             lifetime: Duration::from_secs(30),
-            farewell: Duration::from_secs(2),
+            // As long as a gimbal may take for what was asked last.
+            farewell: Duration::from_secs(25),
         }
     }
 }
 
 /// Serves until the core has dropped its ends of `core`.
-pub async fn run(listen: SocketAddr, core: CoreHandle, limits: Limits) {
+pub async fn run(settings: HttpSettings, core: CoreHandle, limits: Limits) {
+    let HttpSettings { listen, token } = settings;
     let requests = core.requests.clone();
     tokio::select! {
         () = requests.closed() => {}
-        () = async { attend(open(listen, limits.retry).await, listen, core, limits).await } => {}
+        () = async { attend(open(listen, limits.retry).await, listen, core, token, limits).await } => {}
     }
 }
 
 /// Serves those who come to `listener`; `listen` is the address that they were told.
-pub async fn attend(listener: TcpListener, listen: SocketAddr, core: CoreHandle, limits: Limits) {
+pub async fn attend(listener: TcpListener, listen: SocketAddr, core: CoreHandle, token: Option<Token>, limits: Limits) {
+    let controls = Controls::new(token, core.requests.clone(), limits.body);
     let (snapshots, collector) = FreshSnapshots::of(core);
-    tokio::join!(collector.run(), serve(listener, routes::router(snapshots, listen), limits));
+    let router = routes::router(Window { snapshots, controls }, listen);
+    tokio::join!(collector.run(), serve(listener, router, limits));
 }
 
 /// Tries until it succeeds; says once for each kind of failure what to do about it.

@@ -10,11 +10,15 @@ use serde_json::{Value, json};
 use tokio::net::TcpListener;
 use tokio::sync::{mpsc, oneshot, watch};
 
+mod asking;
+
 use super::server::{Limits, attend, run};
 use super::{canned, spawn};
 use crate::bridge::snapshot::Snapshot;
 use crate::config::settings::HttpSettings;
 use crate::daemon::window::{CoreHandle, CoreRequest};
+use crate::manager::asked::{Answer as Outcome, Asked};
+use crate::token::Token;
 
 /// "Angles in degrees, distances in metres, ages in milliseconds, unknown is `null`."
 #[test]
@@ -169,14 +173,14 @@ fn what_is_not_there_is_refused_as_json() {
     let window = Window::of(Snapshot::default());
     for path in ["/api/v1/nothing", "/index.html", "/../etc/passwd", "/%00", "/api/v1/status/"] {
         let answer = window.get(path);
-        let error = json!({"error": "no such page; there are /, /api/v1/status, /healthz and /readyz"});
+        let error = json!({"error": "no such page; there are /, /api/v1/status, /api/v1/gimbals, /api/v1/openapi.json, /healthz and /readyz"});
         assert_eq!((answer.status, answer.json()), (404, error), "{path}");
     }
     for method in ["POST", "PUT", "DELETE", "OPTIONS", "PATCH", "TRACE"] {
         let answer =
             window.ask(&format!("{method} /api/v1/status HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"));
-        let error = json!({"error": "this window is read-only: use GET"});
-        assert_eq!((answer.status, answer.json(), answer.header("allow")), (405, error, Some("GET, HEAD")), "{method}");
+        let error = json!({"error": "another method is needed here; Allow says which"});
+        assert_eq!((answer.status, answer.json(), answer.header("allow")), (405, error, Some("GET,HEAD")), "{method}");
     }
 }
 
@@ -287,7 +291,8 @@ fn a_port_that_is_taken_is_tried_again() {
         let address = occupant.local_addr().expect("its address");
         let (core, _requests, _snapshots) = core();
         let retry = Duration::from_millis(20);
-        tokio::spawn(run(address, core, Limits { retry, ..Limits::default() }));
+        let settings = HttpSettings { listen: address, token: None };
+        tokio::spawn(run(settings, core, Limits { retry, ..Limits::default() }));
         let in_time = async {
             while !journal.text().contains("trying again") {
                 tokio::time::sleep(retry).await;
@@ -310,7 +315,7 @@ fn a_port_that_is_taken_is_tried_again() {
 #[test]
 fn the_thread_ends_with_the_core() {
     let (core, requests, snapshots) = core();
-    let settings = HttpSettings { listen: LOOPBACK.parse().expect("an address"), token_file: None };
+    let settings = HttpSettings { listen: LOOPBACK.parse().expect("an address"), token: None };
     let thread = spawn(settings, core).expect("a thread");
     assert!(!thread.is_finished());
     drop((requests, snapshots));
@@ -345,6 +350,8 @@ struct Window {
     address: SocketAddr,
     stop: Option<oneshot::Sender<()>>,
     thread: Option<JoinHandle<()>>,
+    /// What the core was asked to do.
+    asked: std::sync::mpsc::Receiver<(String, Asked)>,
 }
 
 impl Window {
@@ -354,7 +361,13 @@ impl Window {
 
     /// Without a snapshot the core hangs.
     fn open(snapshot: Option<Snapshot>, limits: Limits) -> Self {
+        Self::controlled(snapshot, None, Ok(()), limits)
+    }
+
+    /// With a core that answers so whatever it is asked.
+    fn controlled(snapshot: Option<Snapshot>, token: Option<Token>, outcome: Outcome, limits: Limits) -> Self {
         let (told, address) = std::sync::mpsc::channel();
+        let (tell, asked) = std::sync::mpsc::channel();
         let (stop, stopped) = oneshot::channel();
         let thread = std::thread::spawn(move || {
             let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
@@ -364,20 +377,27 @@ impl Window {
                 told.send(address).expect("the test waits");
                 let (core, mut requests, published) = core();
                 let answer = async {
-                    while let (Some(CoreRequest::Refresh), Some(snapshot)) = (requests.recv().await, &snapshot) {
-                        published.send_replace(Arc::new(snapshot.clone()));
+                    while let (Some(snapshot), Some(request)) = (&snapshot, requests.recv().await) {
+                        match request {
+                            CoreRequest::Refresh => drop(published.send_replace(Arc::new(snapshot.clone()))),
+                            CoreRequest::Ask { gimbal, asked, answer } => {
+                                // A test may not care, and an asker may have gone.
+                                let _ = tell.send((gimbal, asked));
+                                let _ = answer.send(outcome.clone());
+                            }
+                        }
                     }
                     std::future::pending::<()>().await;
                 };
                 tokio::select! {
-                    () = attend(listener, address, core, limits) => {}
+                    () = attend(listener, address, core, token, limits) => {}
                     () = answer => {}
                     _ = stopped => {}
                 }
             });
         });
         let address = address.recv_timeout(PATIENCE).expect("the window opens");
-        Self { address, stop: Some(stop), thread: Some(thread) }
+        Self { address, stop: Some(stop), thread: Some(thread), asked }
     }
 
     fn connect(&self) -> TcpStream {

@@ -474,30 +474,34 @@ fn endpoints_say_what_is_wrong_with_them() {
     }
 }
 
-/// "mode 0600".
+/// "mode 0600": a token that is missing, empty, readable by others or somebody else's is refused, and never shown.
 #[test]
-fn a_token_that_others_can_read_is_refused() {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let token = folder.path().join("token");
+fn a_token_that_is_no_secret_is_refused() {
+    let (_folder, token) = token_file();
     let path = token.display();
     let text = format!("[http]\ntoken_file = \"{path}\"\n");
-
-    // A token that is not there yet locks everybody out.
-    assert_eq!(check(&format!("{LINK}{text}"), &[]).code, Some(0));
-    fs::write(&token, "secret").expect("a writable folder");
+    let refusal = |what: &str| {
+        format!(
+            "c.toml:6: http.token_file: found \"{path}\", which {what}; expected a file with one word of 16 to 256 characters that only the user who runs gimbald can read: openssl rand -hex 32, chown gimbald, chmod 0600"
+        )
+    };
     for (mode, right) in [(0o600, true), (0o400, true), (0o640, false), (0o604, false), (0o666, false)] {
         fs::set_permissions(&token, fs::Permissions::from_mode(mode)).expect("our own file");
         if right {
             assert_eq!(check(&format!("{LINK}{text}"), &[]).code, Some(0), "{mode:o}");
         } else {
-            assert_refused(
-                &text,
-                &[&format!(
-                    "c.toml:6: http.token_file: found \"{path}\", which has mode {mode:04o}; expected a file that only its owner can read: chmod 0600"
-                )],
-            );
+            assert_refused(&text, &[&refusal(&format!("has mode {mode:04o}, so that others can read or change it"))]);
         }
     }
+    fs::set_permissions(&token, fs::Permissions::from_mode(0o600)).expect("our own file");
+    for (content, what) in
+        [("\n", "is empty"), ("short", "does not hold one word of 16 to 256 printable ASCII characters")]
+    {
+        fs::write(&token, content).expect("our own file");
+        assert_refused(&text, &[&refusal(what)]);
+    }
+    fs::remove_file(&token).expect("our own file");
+    assert_refused(&text, &[&refusal("cannot be read: No such file or directory (os error 2)")]);
     assert_refused(
         "[http]\ntoken_file = \"token\"\n",
         &[
@@ -657,6 +661,15 @@ listen = "[::1]:9090"
 token_file = "/nowhere/token"
 "#;
 
+/// A file with a token, and the folder it lives in.
+fn token_file() -> (tempfile::TempDir, std::path::PathBuf) {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("token");
+    fs::write(&path, "0123456789abcdef\n").expect("a writable folder");
+    fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).expect("our own file");
+    (folder, path)
+}
+
 #[test]
 fn every_key_arrives_where_it_belongs() {
     let link = |name: &str, role, endpoint: &str, transport, speaks_first, max_rates: &[(u32, u64)]| LinkSettings {
@@ -713,15 +726,14 @@ fn every_key_arrives_where_it_belongs() {
         endpoints: vec![serial.parse().expect(serial), tcp.parse().expect(tcp), broadcast.parse().expect(broadcast)],
         http: Some(HttpSettings {
             listen: "[::1]:9090".parse().expect("an address"),
-            token_file: Some("/nowhere/token".into()),
+            token: Some("0123456789abcdef".parse().expect("a token")),
         }),
         directories: Directories { state: Some("/var/lib/gimbald".into()), runtime: Some("/run/gimbald".into()) },
     };
+    let (_folder, token) = token_file();
+    let text = EVERY_KEY.replace("/nowhere/token", &token.to_string_lossy());
     assert_eq!(
-        load(
-            EVERY_KEY,
-            &[("STATE_DIRECTORY", "/var/lib/gimbald:/var/lib/other"), ("RUNTIME_DIRECTORY", "/run/gimbald")]
-        ),
+        load(&text, &[("STATE_DIRECTORY", "/var/lib/gimbald:/var/lib/other"), ("RUNTIME_DIRECTORY", "/run/gimbald")]),
         Ok(expected)
     );
 }
@@ -735,7 +747,7 @@ fn what_is_not_said_has_its_default() {
     assert_eq!(loaded.core.control, ControlSettings::default());
     assert!(!loaded.core.present_device);
     let listen = "127.0.0.1:8080".parse().expect("an address");
-    assert_eq!(loaded.http, Some(HttpSettings { listen, token_file: None }));
+    assert_eq!(loaded.http, Some(HttpSettings { listen, token: None }));
     assert_eq!(loaded.directories, Directories::default());
 
     let loaded = load(&format!("{LINK}[[gimbal]]\nname = \"camera\"\n"), &[]).expect("a right file");
@@ -782,6 +794,8 @@ fn each_axis_of_a_gimbal_has_a_sign_of_its_own() {
 /// Every key of every section is read from a variable as it is from the file.
 #[test]
 fn variables_override_the_file() {
+    let (_folder, token) = token_file();
+    let token = token.to_str().expect("a path in UTF-8");
     let variables = [
         ("GIMBALD__LINK__Ground__ROLE", "ground"),
         ("GIMBALD__LINK__GROUND__ENDPOINT", "udpbcast:10.0.0.255:14550"),
@@ -811,7 +825,7 @@ fn variables_override_the_file() {
         ("GIMBALD__CONTROL__SYNTHESIZE_286", "off"),
         ("GIMBALD__ROI__ALTITUDE_REFERENCE", "amsl"),
         ("GIMBALD__HTTP__LISTEN", "[::1]:9090"),
-        ("GIMBALD__HTTP__TOKEN_FILE", "/nowhere/token"),
+        ("GIMBALD__HTTP__TOKEN_FILE", token),
     ];
     let bare = r#"
 [[link]]
@@ -832,7 +846,7 @@ name = "nose-cam"
 takeover = "open"
 "#;
 
-    let from_file = load(EVERY_KEY, &[]).expect("a right file");
+    let from_file = load(&EVERY_KEY.replace("/nowhere/token", token), &[]).expect("a right file");
     let from_variables = load(bare, &variables).expect("right variables");
 
     assert_eq!(from_variables, from_file);

@@ -11,6 +11,7 @@ mod demo;
 mod dialect_oracle;
 mod gimbal_manager_document;
 mod gimbald;
+mod interface_document;
 mod pacing;
 mod properties;
 mod restart;

@@ -1,6 +1,7 @@
 //! What is installed beside the binary is right, as the tools that will read it say.
 
 use std::fs;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -45,7 +46,12 @@ fn the_commented_lines_of_the_shipped_configuration_are_right_as_well() {
         })
         .collect();
     let folder = tempfile::tempdir().expect("a temporary folder");
-    fs::write(folder.path().join("all.toml"), all.join("\n")).expect("a writable folder");
+    // A token that is missing is refused.
+    let token = folder.path().join("http-token");
+    fs::write(&token, "0123456789abcdef").expect("a writable folder");
+    fs::set_permissions(&token, fs::Permissions::from_mode(0o600)).expect("our own file");
+    let all = all.join("\n").replace("/etc/gimbald/http-token", &token.to_string_lossy());
+    fs::write(folder.path().join("all.toml"), all).expect("a writable folder");
 
     let outcome = gimbald(folder.path(), &["check", "--config", "all.toml"], &[]);
 

@@ -1,0 +1,111 @@
+//! What can be asked of a gimbal by its name: the one table from which the window has its paths, `gimbald gimbal` its
+//! commands, and both what they take.
+
+mod fields;
+mod table;
+
+use serde_json::{Map, Value};
+
+use crate::gimbals::operation::{Motors, Operation, Restart};
+use crate::manager::asked::Asked;
+pub use fields::{Field, Kind, Values, Wrong};
+pub use table::ACTIONS;
+
+/// The field that holds the word of what is dangerous.
+pub const CONFIRM: &str = "confirm";
+
+/// One thing that can be asked.
+pub struct Action {
+    /// Where, below the gimbal; a part in braces is the field of that name.
+    pub path: &'static str,
+    /// On the command line.
+    pub command: &'static str,
+    pub about: &'static str,
+    pub fields: &'static [Field],
+    /// The word without which it is not done, where it is dangerous.
+    pub word: Option<&'static str>,
+    read: fn(&Values) -> Result<Asked, Wrong>,
+}
+
+impl Action {
+    pub fn of_command(command: &str) -> Option<&'static Self> {
+        ACTIONS.iter().find(|action| action.command == command)
+    }
+
+    /// The field that stands in the path.
+    pub fn path_field(&self) -> Option<&'static Field> {
+        let (_, rest) = self.path.split_once('{')?;
+        let (name, _) = rest.split_once('}')?;
+        self.fields.iter().find(|field| field.name == name)
+    }
+
+    /// Those that stand in the body.
+    pub fn body_fields(&self) -> impl Iterator<Item = &'static Field> {
+        let in_path = self.path_field().map(|field| field.name);
+        self.fields.iter().filter(move |field| Some(field.name) != in_path)
+    }
+
+    /// Reads what is asked: `in_path` is the value that stands in the path, decoded.
+    pub fn read(&self, in_path: Option<&str>, body: &[u8]) -> Result<Asked, Wrong> {
+        let mut values = Values::default();
+        if let (Some(field), Some(text)) = (self.path_field(), in_path) {
+            values.take(field, Value::String(text.to_owned()))?;
+        }
+        let mut confirmed = None;
+        for (name, value) in fields::object(body)? {
+            if name == CONFIRM && self.word.is_some() {
+                confirmed = value.as_str().map(str::to_owned);
+                continue;
+            }
+            match self.body_fields().find(|field| field.name == name) {
+                Some(field) => values.take(field, value)?,
+                None => return Err(Wrong::UnknownField { name, known: self.names_in_body() }),
+            }
+        }
+        if let Some(field) = self.fields.iter().find(|field| field.required && !values.has(field.name)) {
+            return Err(Wrong::Missing { name: field.name, expected: field.kind.expected() });
+        }
+        let asked = (self.read)(&values)?;
+        match word_for(&asked) {
+            Some(word) if confirmed.as_deref() != Some(word) => Err(Wrong::Unconfirmed { word }),
+            Some(_) | None => Ok(asked),
+        }
+    }
+
+    fn names_in_body(&self) -> Vec<&'static str> {
+        self.body_fields().map(|field| field.name).chain(self.word.map(|_| CONFIRM)).collect()
+    }
+
+    /// The path with `in_path` in its place, percent-encoded.
+    pub fn path_with(&self, in_path: Option<&str>) -> String {
+        match (self.path_field(), in_path) {
+            (Some(field), Some(value)) => self.path.replace(&format!("{{{}}}", field.name), &percent_encoded(value)),
+            _ => self.path.to_owned(),
+        }
+    }
+}
+
+/// The word without which it is not done.
+pub fn word_for(asked: &Asked) -> Option<&'static str> {
+    match asked {
+        Asked::Operation(Operation::Motors(Motors::Off)) => Some("motors off"),
+        Asked::Operation(Operation::Restart(Restart::Reboot)) => Some("reboot"),
+        Asked::Operation(Operation::Restart(Restart::Shutdown)) => Some("shutdown"),
+        _ => None,
+    }
+}
+
+/// A part of a path as it is sent.
+pub fn percent_encoded(part: &str) -> String {
+    let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~".contains(&byte);
+    let encode = |byte: u8| if plain(byte) { char::from(byte).to_string() } else { format!("%{byte:02X}") };
+    part.bytes().map(encode).collect()
+}
+
+/// A body of these fields.
+pub fn body(fields: impl IntoIterator<Item = (String, Value)>) -> Vec<u8> {
+    Value::Object(Map::from_iter(fields)).to_string().into_bytes()
+}
+
+#[cfg(test)]
+mod tests;

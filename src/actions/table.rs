@@ -1,0 +1,456 @@
+//! The table itself. Angles in degrees, pitch up and yaw to the right positive.
+
+use super::Action;
+use super::fields::{Field, Kind, Values, Wrong};
+use crate::geometry::{Angle, AngularRate, AxisLimits, YawFrame};
+use crate::gimbals::operation::{
+    Axis, AxisMotion, EncoderUnit, MotorAxis, MotorControl, Motors, Operation, RadioType, ResetMode, Restart, Stream,
+    StreamRate, YawMode,
+};
+use crate::manager::asked::Asked;
+use crate::manager::request::AxisDemand;
+use crate::manager::roi::Datum;
+
+/// Everything that can be asked.
+pub const ACTIONS: &[Action] = &[
+    Action {
+        path: "control",
+        command: "control",
+        about: "Take control of the gimbal, or give it up. Who asks for nothing for lease_timeout_s loses it; taking it again keeps it",
+        fields: &[word("action", "what to do", &["take", "release"])],
+        word: None,
+        read: |values| {
+            Ok(if values.word("action") == Some("take") { Asked::TakeControl } else { Asked::ReleaseControl })
+        },
+    },
+    Action {
+        path: "point",
+        command: "point",
+        about: "Look along these angles and keep them; an axis that is left out stays as it is",
+        fields: &[
+            number("pitch_deg", "up is positive", 180.0),
+            number("yaw_deg", "right is positive", 360.0),
+            number("roll_deg", "right side down is positive; 0 where it is left out", 180.0),
+            YAW_FRAME,
+            positive("pitch_rate_dps", "go there no faster than this", 720.0),
+            positive("yaw_rate_dps", "go there no faster than this", 720.0),
+        ],
+        word: None,
+        read: point,
+    },
+    Action {
+        path: "turn",
+        command: "turn",
+        about: "Turn at these rates; ends rate_timeout_s after it was last asked for",
+        fields: &[
+            number("pitch_dps", "degrees per second, up is positive", 720.0),
+            number("yaw_dps", "degrees per second, right is positive", 720.0),
+            number("roll_dps", "degrees per second, right side down is positive", 720.0),
+            YAW_FRAME,
+        ],
+        word: None,
+        read: turn,
+    },
+    plain("stop", "stop", "Stay where it looks at this moment", |_| Ok(Asked::Stop)),
+    plain("lock", "lock", "Keep its direction, yaw to North however the vehicle turns", |_| Ok(Asked::Lock)),
+    plain("follow", "follow", "Keep its direction, yaw to the nose of the vehicle", |_| Ok(Asked::Follow)),
+    plain("neutral", "neutral", "Go to the neutral position", |_| Ok(Asked::Neutral)),
+    plain("retract", "retract", "Go to the retracted position", |_| Ok(Asked::Retract)),
+    Action {
+        path: "roi",
+        command: "roi",
+        about: "Look at a place until something else is asked for",
+        fields: &[
+            required(number("latitude_deg", "WGS 84", 90.0)),
+            required(number("longitude_deg", "WGS 84", 180.0)),
+            required(number("altitude_m", "above altitude_reference", 100_000.0)),
+            optional(word("altitude_reference", "mean sea level (the default), or home", &["amsl", "home"])),
+        ],
+        word: None,
+        read: |values| {
+            Ok(Asked::LookAt {
+                latitude_deg: values.number("latitude_deg").unwrap_or_default(),
+                longitude_deg: values.number("longitude_deg").unwrap_or_default(),
+                altitude_m: values.number("altitude_m").unwrap_or_default(),
+                datum: if values.word("altitude_reference") == Some("home") {
+                    Datum::Home
+                } else {
+                    Datum::MeanSeaLevel
+                },
+            })
+        },
+    },
+    plain("roi/end", "roi-end", "Look at no place any more, and go to the neutral position", |_| Ok(Asked::EndRoi)),
+    Action {
+        path: "motors",
+        command: "motors",
+        about: "Switch the motors; without them the camera falls to where its weight takes it",
+        fields: &[word("state", "off is dangerous", &["on", "off"])],
+        word: Some("motors off"),
+        read: |values| {
+            operation(Operation::Motors(if values.word("state") == Some("off") { Motors::Off } else { Motors::On }))
+        },
+    },
+    Action {
+        path: "reboot",
+        command: "reboot",
+        about: "Start the gimbal again; the camera is not held meanwhile",
+        fields: &[],
+        word: Some("reboot"),
+        read: |_| operation(Operation::Restart(Restart::Reboot)),
+    },
+    Action {
+        path: "shutdown",
+        command: "shutdown",
+        about: "Shut the gimbal down; it must be switched on by hand",
+        fields: &[],
+        word: Some("shutdown"),
+        read: |_| operation(Operation::Restart(Restart::Shutdown)),
+    },
+    Action {
+        path: "yaw-mode",
+        command: "yaw-mode",
+        about: "Use the gimbal's own lock or follow mode, yaw to what it takes for North or to the nose",
+        fields: &[word("mode", "which", &["lock", "follow"])],
+        word: None,
+        read: |values| {
+            operation(Operation::SetYawMode(if values.word("mode") == Some("lock") {
+                YawMode::Lock
+            } else {
+                YawMode::Follow
+            }))
+        },
+    },
+    plain("mapping", "mapping", "Look straight down, the top of the picture to the nose", |_| {
+        operation(Operation::Mapping)
+    }),
+    Action {
+        path: "reset",
+        command: "reset",
+        about: "Turn the camera back by the gimbal's own function",
+        fields: &[word("mode", "which axes to where", &RESET_MODES)],
+        word: None,
+        read: |values| {
+            operation(Operation::Reset(match values.word("mode") {
+                Some("yaw") => ResetMode::Yaw,
+                Some("pitch_down_up_and_yaw") => ResetMode::PitchDownUpAndYaw,
+                Some("pitch_down_up") => ResetMode::PitchDownUp,
+                Some("pitch_mapping") => ResetMode::PitchMapping,
+                _ => ResetMode::PitchAndYaw,
+            }))
+        },
+    },
+    plain(
+        "radio-control",
+        "radio-control",
+        "Leave the gimbal to its own radio receiver until something else is asked for",
+        |_| operation(Operation::RadioControl),
+    ),
+    Action {
+        path: "radio-type",
+        command: "radio-type",
+        about: "Say which radio receiver the gimbal has; sync is control by MAVLink",
+        fields: &[word("type", "the kind of receiver", &RADIO_TYPES)],
+        word: None,
+        read: |values| {
+            let index = RADIO_TYPES.iter().position(|name| values.word("type") == Some(*name)).unwrap_or_default();
+            operation(Operation::SetRadioType(RADIO_TYPE_VALUES[index]))
+        },
+    },
+    plain("information", "information", "Ask the gimbal once more who it is", |_| {
+        operation(Operation::RequestInformation)
+    }),
+    Action {
+        path: "stream-rates",
+        command: "stream-rate",
+        about: "Set how often the gimbal sends one of its messages",
+        fields: &[
+            word("stream", "the message", &["encoders", "mount_orientation", "attitude_status", "raw_imu"]),
+            required(Field {
+                name: "rate_hz",
+                about: "times a second; default is as often as the gimbal does by itself",
+                kind: Kind::WholeOrWord { min: 1, max: 200, words: &["off", "default"] },
+                required: true,
+            }),
+        ],
+        word: None,
+        read: |values| {
+            let stream = match values.word("stream") {
+                Some("encoders") => Stream::Encoders,
+                Some("mount_orientation") => Stream::MountOrientation,
+                Some("raw_imu") => Stream::RawImu,
+                _ => Stream::AttitudeStatus,
+            };
+            let rate = match (values.number("rate_hz"), values.word("rate_hz")) {
+                (Some(hertz), _) => StreamRate::Hertz(hertz as u8),
+                (None, Some("off")) => StreamRate::Off,
+                (None, _) => StreamRate::Default,
+            };
+            operation(Operation::SetStreamRate { stream, rate })
+        },
+    },
+    plain("parameters/refresh", "refresh-parameters", "Read every parameter of the gimbal again", |_| {
+        operation(Operation::RefreshParameters)
+    }),
+    Action {
+        path: "parameters/{parameter}",
+        command: "set-parameter",
+        about: "Write a parameter of the gimbal",
+        fields: &[
+            Field { name: "parameter", about: "its name", kind: Kind::Name { longest: 16 }, required: true },
+            required(number("value", "its new value", 16_777_216.0)),
+        ],
+        word: None,
+        read: |values| {
+            let name = values.word("parameter").unwrap_or_default().to_owned();
+            operation(Operation::SetParameter { name, value: values.number("value").unwrap_or_default() })
+        },
+    },
+    Action {
+        path: "axes/{axis}",
+        command: "axis",
+        about: "Set how one axis moves; what is left out stays as it is",
+        fields: &[
+            AXIS,
+            scale("follow_speed", "how fast it follows the vehicle"),
+            scale("follow_smoothing", "how smoothly it follows the vehicle"),
+            positive("follow_window_deg", "how far the vehicle may turn before it follows, degrees", 180.0),
+            positive("control_speed_dps", "its highest speed under control, degrees per second", 720.0),
+            scale("control_smoothing", "how smoothly it starts and stops under control"),
+            Field {
+                name: "reversed",
+                about: "whether it turns the other way under radio control",
+                kind: Kind::Flag,
+                required: false,
+            },
+        ],
+        word: None,
+        read: axis_motion,
+    },
+    Action {
+        path: "motor-control",
+        command: "motor-control",
+        about: "Set how the motors hold the camera; what is left out stays as it is",
+        fields: &[
+            scale("tilt_stiffness", "stiffness of tilt"),
+            scale("tilt_hold_strength", "hold strength of tilt"),
+            scale("roll_stiffness", "stiffness of roll"),
+            scale("roll_hold_strength", "hold strength of roll"),
+            scale("pan_stiffness", "stiffness of pan"),
+            scale("pan_hold_strength", "hold strength of pan"),
+            scale("gyro_filter", "filter of the gyroscopes"),
+            scale("output_filter", "filter of the output"),
+            scale("gain", "gain; only older gimbals have it"),
+        ],
+        word: None,
+        read: motor_control,
+    },
+    Action {
+        path: "limits/{axis}",
+        command: "limits",
+        about: "Set the software limits of one axis",
+        fields: &[
+            AXIS,
+            required(number("min_deg", "the lower one; down and left are negative", 360.0)),
+            required(number("max_deg", "the upper one", 360.0)),
+        ],
+        word: None,
+        read: |values| {
+            let degrees = |name| Angle::from_degrees(values.number(name).unwrap_or_default());
+            let limits = AxisLimits::new(degrees("min_deg"), degrees("max_deg"));
+            let limits = limits.ok_or(Wrong::Together("min_deg must not be above max_deg"))?;
+            operation(Operation::SetLimits { axis: axis(values), limits })
+        },
+    },
+    Action {
+        path: "encoder-unit",
+        command: "encoder-unit",
+        about: "Set what the gimbal's encoder message carries",
+        fields: &[word("unit", "65536 counts to the turn, or angles", &["counts", "angles"])],
+        word: None,
+        read: |values| {
+            operation(Operation::SetEncoderUnit(if values.word("unit") == Some("counts") {
+                EncoderUnit::Counts
+            } else {
+                EncoderUnit::Angles
+            }))
+        },
+    },
+    switch("combined-attitude", "Let the autopilot's attitude keep the gimbal's yaw from drifting", |values| {
+        operation(Operation::SetCombinedAttitude(values.flag("enabled") == Some(true)))
+    }),
+    switch("home-on-mode-change", "Let the gimbal return home whenever lock and follow are switched", |values| {
+        operation(Operation::SetHomeOnModeChange(values.flag("enabled") == Some(true)))
+    }),
+];
+
+const RESET_MODES: [&str; 5] = ["yaw", "pitch_and_yaw", "pitch_down_up_and_yaw", "pitch_down_up", "pitch_mapping"];
+
+const RADIO_TYPES: [&str; 11] = [
+    "sbus_fasst",
+    "joystick",
+    "jr_11bit",
+    "jr_10bit",
+    "ppm",
+    "sync",
+    "lb2_single",
+    "lb2_normal",
+    "sync2",
+    "sbus_sfhss",
+    "herelink",
+];
+const RADIO_TYPE_VALUES: [RadioType; RADIO_TYPES.len()] = [
+    RadioType::SbusFasst,
+    RadioType::Joystick,
+    RadioType::Jr11Bit,
+    RadioType::Jr10Bit,
+    RadioType::Ppm,
+    RadioType::Sync,
+    RadioType::Lb2Single,
+    RadioType::Lb2Normal,
+    RadioType::Sync2,
+    RadioType::SbusSfhss,
+    RadioType::Herelink,
+];
+
+const YAW_FRAME: Field = optional(word(
+    "yaw_frame",
+    "what yaw counts from and is kept to: the nose (the default) or North",
+    &["vehicle", "earth"],
+));
+const AXIS: Field = word("axis", "pitch is tilt, yaw is pan", &["tilt", "roll", "pan"]);
+
+/// One without fields.
+const fn plain(
+    path: &'static str,
+    command: &'static str,
+    about: &'static str,
+    read: fn(&Values) -> Result<Asked, Wrong>,
+) -> Action {
+    Action { path, command, about, fields: &[], word: None, read }
+}
+
+/// One that is on or off.
+const fn switch(path: &'static str, about: &'static str, read: fn(&Values) -> Result<Asked, Wrong>) -> Action {
+    const ENABLED: &[Field] = &[Field { name: "enabled", about: "whether it does", kind: Kind::Flag, required: true }];
+    Action { path, command: path, about, fields: ENABLED, word: None, read }
+}
+
+const fn word(name: &'static str, about: &'static str, words: &'static [&'static str]) -> Field {
+    Field { name, about, kind: Kind::Word(words), required: true }
+}
+
+/// A number that may be left out, of either sign.
+const fn number(name: &'static str, about: &'static str, largest: f64) -> Field {
+    Field { name, about, kind: Kind::Number { min: -largest, max: largest }, required: false }
+}
+
+/// The same from 0.
+const fn positive(name: &'static str, about: &'static str, largest: f64) -> Field {
+    Field { name, about, kind: Kind::Number { min: 0.0, max: largest }, required: false }
+}
+
+/// A number on a scale of the gimbal's own, which is what its parameters can hold: 16 bits.
+const fn scale(name: &'static str, about: &'static str) -> Field {
+    positive(name, about, 32_767.0)
+}
+
+const fn required(field: Field) -> Field {
+    Field { required: true, ..field }
+}
+
+const fn optional(field: Field) -> Field {
+    Field { required: false, ..field }
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "the rows of the table may fail")]
+fn operation(operation: Operation) -> Result<Asked, Wrong> {
+    Ok(Asked::Operation(operation))
+}
+
+fn yaw_frame(values: &Values) -> YawFrame {
+    if values.word("yaw_frame") == Some("earth") { YawFrame::Earth } else { YawFrame::Vehicle }
+}
+
+fn axis(values: &Values) -> Axis {
+    match values.word("axis") {
+        Some("roll") => Axis::Roll,
+        Some("pan") => Axis::Pan,
+        _ => Axis::Tilt,
+    }
+}
+
+fn needs_one(values: &Values, names: &[&'static str]) -> Result<(), Wrong> {
+    if names.iter().any(|name| values.has(name)) { Ok(()) } else { Err(Wrong::Nothing(names.to_vec())) }
+}
+
+fn point(values: &Values) -> Result<Asked, Wrong> {
+    needs_one(values, &["pitch_deg", "yaw_deg", "roll_deg"])?;
+    if !values.has("pitch_deg") && values.has("pitch_rate_dps") || !values.has("yaw_deg") && values.has("yaw_rate_dps")
+    {
+        return Err(Wrong::Together("a rate without an angle on its axis; to turn there is turn"));
+    }
+    let demand = |angle, rate| AxisDemand {
+        angle: values.number(angle).map(Angle::from_degrees),
+        rate: values.number(rate).map(AngularRate::from_degrees_per_second),
+    };
+    let yaw = demand("yaw_deg", "yaw_rate_dps");
+    Ok(Asked::Point {
+        roll: demand("roll_deg", ""),
+        pitch: demand("pitch_deg", "pitch_rate_dps"),
+        yaw: AxisDemand { angle: yaw.angle.map(Angle::wrapped), ..yaw },
+        yaw_frame: yaw_frame(values),
+    })
+}
+
+fn turn(values: &Values) -> Result<Asked, Wrong> {
+    needs_one(values, &["pitch_dps", "yaw_dps", "roll_dps"])?;
+    let rate = |name| values.number(name).map(AngularRate::from_degrees_per_second);
+    Ok(Asked::Turn {
+        roll: rate("roll_dps"),
+        pitch: rate("pitch_dps").unwrap_or(AngularRate::ZERO),
+        yaw: rate("yaw_dps").unwrap_or(AngularRate::ZERO),
+        yaw_frame: yaw_frame(values),
+    })
+}
+
+fn axis_motion(values: &Values) -> Result<Asked, Wrong> {
+    let motion = AxisMotion {
+        follow_speed: values.number("follow_speed"),
+        follow_smoothing: values.number("follow_smoothing"),
+        follow_window_deg: values.number("follow_window_deg"),
+        control_speed_dps: values.number("control_speed_dps"),
+        control_smoothing: values.number("control_smoothing"),
+        reversed: values.flag("reversed"),
+    };
+    if motion == AxisMotion::default() {
+        return Err(Wrong::Nothing(vec![
+            "follow_speed",
+            "follow_smoothing",
+            "follow_window_deg",
+            "control_speed_dps",
+            "control_smoothing",
+            "reversed",
+        ]));
+    }
+    operation(Operation::SetAxisMotion { axis: axis(values), motion })
+}
+
+fn motor_control(values: &Values) -> Result<Asked, Wrong> {
+    let axis = |stiffness, hold_strength| MotorAxis {
+        stiffness: values.number(stiffness),
+        hold_strength: values.number(hold_strength),
+    };
+    let motors = MotorControl {
+        tilt: axis("tilt_stiffness", "tilt_hold_strength"),
+        roll: axis("roll_stiffness", "roll_hold_strength"),
+        pan: axis("pan_stiffness", "pan_hold_strength"),
+        gyro_filter: values.number("gyro_filter"),
+        output_filter: values.number("output_filter"),
+        gain: values.number("gain"),
+    };
+    if motors == MotorControl::default() {
+        return Err(Wrong::Nothing(vec!["tilt_stiffness", "gyro_filter", "and the like"]));
+    }
+    operation(Operation::SetMotorControl(motors))
+}

@@ -1,0 +1,43 @@
+//! `docs/interface.md` says of every action what the table in the code says.
+
+use std::fs;
+use std::path::Path;
+
+use gimbald::actions::{ACTIONS, Action, CONFIRM, Field, Kind};
+
+/// "One table in code from which routes, CLI and docs agree". To have a row as it must be, read what this test found missing.
+#[test]
+fn every_action_has_its_row() {
+    let document = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/interface.md");
+    let document = fs::read_to_string(document).expect("it is there");
+    let rows = ACTIONS.iter().map(row);
+    let missing: Vec<String> = rows.filter(|row| !document.lines().any(|line| line == row)).collect();
+    assert!(missing.is_empty(), "missing in docs/interface.md:\n{}", missing.join("\n"));
+}
+
+fn row(action: &Action) -> String {
+    let fields: Vec<String> = action.body_fields().map(described).collect();
+    let mut fields = if fields.is_empty() { "–".to_owned() } else { fields.join("; ") };
+    if let Some(word) = action.word {
+        let when = if action.path == "motors" { " for `off`" } else { "" };
+        let confirmed = format!("`{CONFIRM}`: `{word}`{when}");
+        fields = if fields == "–" { confirmed } else { format!("{fields}; {confirmed}") };
+    }
+    format!("| `{}` | {} | {fields} | `{}` |", action.path, action.about, action.command)
+}
+
+fn described(field: &Field) -> String {
+    let kind = match field.kind {
+        Kind::Number { min, max } => format!("{min} to {max}"),
+        Kind::Word(words) => listed(words),
+        Kind::WholeOrWord { min, max, words } => format!("{min} to {max}, {}", listed(words)),
+        Kind::Flag => "`true`, `false`".to_owned(),
+        Kind::Name { longest } => format!("up to {longest} characters"),
+    };
+    let optional = if field.required { "" } else { "?" };
+    format!("`{}`{optional} ({kind}): {}", field.name, field.about)
+}
+
+fn listed(words: &[&str]) -> String {
+    words.iter().map(|word| format!("`{word}`")).collect::<Vec<_>>().join(", ")
+}
