@@ -2,8 +2,12 @@
 
 use std::time::Duration;
 
-use crate::geometry::{Angle, AngularRate};
+use crate::geometry::{Angle, AngularRate, Attitude, EarthFrame};
+use crate::sim::peer::PlatformMotion;
 use crate::timestamp::Timestamp;
+use crate::wire::Frame;
+use crate::wire::dialect::{ATTITUDE_DATA, AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA};
+use crate::wire::ids::component;
 
 /// A heading that is older counts as unknown.
 const VALID: Duration = Duration::from_secs(1);
@@ -16,7 +20,7 @@ const REFERENCE_TIME: Duration = Duration::from_secs(2);
 const FASTEST_TURN: f64 = 3.5;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum HeadingSource {
+enum HeadingSource {
     /// `AUTOPILOT_STATE_FOR_GIMBAL_DEVICE`.
     State,
     /// `ATTITUDE`.
@@ -39,8 +43,53 @@ pub struct HeadingBelief {
 }
 
 impl HeadingBelief {
+    /// What a frame tells of the vehicle's motion: `AUTOPILOT_STATE_FOR_GIMBAL_DEVICE`, or `ATTITUDE` of an autopilot
+    /// while that does not come.
+    pub fn handle_frame(&mut self, now: Timestamp, frame: &Frame<'_>) -> Option<PlatformMotion> {
+        if let Some(state) = frame.decode() {
+            self.handle_state(now, &state)
+        } else if frame.source().component == component::AUTOPILOT1 {
+            self.handle_attitude(now, &frame.decode()?)
+        } else {
+            None
+        }
+    }
+
+    fn handle_state(
+        &mut self,
+        now: Timestamp,
+        state: &AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA,
+    ) -> Option<PlatformMotion> {
+        let attitude = Attitude::<EarthFrame>::from_wxyz(state.q).ok().flatten()?;
+        // Zero stands for unknown in this field.
+        let rate = f64::from(state.angular_velocity_z);
+        let rate = (rate.is_finite() && rate != 0.0).then(|| AngularRate::from_radians_per_second(rate));
+        self.handle_heading(now, HeadingSource::State, attitude.heading(), rate)
+            .then(|| self.motion(now, [0.0, 0.0]))
+            .flatten()
+    }
+
+    fn handle_attitude(&mut self, now: Timestamp, attitude: &ATTITUDE_DATA) -> Option<PlatformMotion> {
+        let [yaw, roll_rate, pitch_rate, yaw_rate] =
+            [attitude.yaw, attitude.rollspeed, attitude.pitchspeed, attitude.yawspeed].map(f64::from);
+        if !yaw.is_finite() {
+            return None;
+        }
+        let rate = yaw_rate.is_finite().then(|| AngularRate::from_radians_per_second(yaw_rate));
+        let finite = |rate: f64| if rate.is_finite() { rate } else { 0.0 };
+        self.handle_heading(now, HeadingSource::Attitude, Angle::from_radians(yaw), rate)
+            .then(|| self.motion(now, [finite(roll_rate), finite(pitch_rate)]))
+            .flatten()
+    }
+
+    fn motion(&self, now: Timestamp, roll_and_pitch_rate: [f64; 2]) -> Option<PlatformMotion> {
+        let (heading, heading_rate) = self.at(now)?;
+        let [roll_rate, pitch_rate] = roll_and_pitch_rate.map(AngularRate::from_radians_per_second);
+        Some(PlatformMotion { heading, heading_rate, roll_rate, pitch_rate })
+    }
+
     /// Takes a heading, and the rate of turn if it came with one; false when a better source makes it superfluous.
-    pub fn handle_heading(
+    fn handle_heading(
         &mut self,
         now: Timestamp,
         source: HeadingSource,

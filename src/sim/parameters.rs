@@ -1,9 +1,11 @@
 //! The parameter protocol of a simulated peer.
 
 use std::collections::VecDeque;
+use std::ops::RangeInclusive;
 use std::time::Duration;
 
 use crate::sim::outbox::Outbox;
+use crate::sim::random::Random;
 use crate::timestamp::Timestamp;
 use crate::wire::Frame;
 use crate::wire::dialect::{CharArray, PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA};
@@ -12,6 +14,8 @@ use crate::wire::ids::message;
 /// Values of one answer to `PARAM_REQUEST_LIST` follow each other at this interval.
 const LIST_INTERVAL: Duration = Duration::from_millis(5);
 
+/// `MAV_PARAM_TYPE_INT16`.
+const INT16: u8 = 4;
 /// `MAV_PARAM_TYPE_UINT32`.
 const UINT32: u8 = 5;
 /// `MAV_PARAM_TYPE_INT32`.
@@ -24,6 +28,7 @@ const HASH_CHECK: &str = "_HASH_CHECK";
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ParameterValue {
+    Short(i16),
     Integer(i32),
     Float(f32),
 }
@@ -37,21 +42,71 @@ pub enum IntegerEncoding {
     CCast,
 }
 
+/// One parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    pub name: &'static str,
+    pub index: u16,
+    pub value: ParameterValue,
+    pub writable: Writable,
+}
+
+/// What may be written to a parameter.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Writable {
+    Anything,
+    Within(RangeInclusive<i16>),
+    Nothing,
+}
+
+/// How long it takes until a written parameter is told back.
+#[derive(Clone, Debug)]
+struct Flash {
+    least: Duration,
+    spread: Duration,
+    random: Random,
+}
+
 /// Answers `PARAM_REQUEST_LIST`, `PARAM_REQUEST_READ` and `PARAM_SET`.
 #[derive(Clone, Debug)]
 pub struct ParameterServer {
-    /// Sorted by name.
-    list: Vec<(&'static str, ParameterValue)>,
+    /// Sorted by index.
+    list: Vec<Parameter>,
     encoding: IntegerEncoding,
     has_hash: bool,
+    flash: Option<Flash>,
+    /// Places in the list, yet to be told.
     pending: VecDeque<usize>,
     next: Timestamp,
+    /// The same for what was written, with the time.
+    echoes: Vec<(Timestamp, usize)>,
 }
 
 impl ParameterServer {
+    /// With indices in the order of the names.
     pub fn new(mut list: Vec<(&'static str, ParameterValue)>, encoding: IntegerEncoding) -> Self {
         list.sort_by_key(|(name, _)| *name);
-        Self { list, encoding, has_hash: false, pending: VecDeque::new(), next: Timestamp::ZERO }
+        let list = (0..).zip(list).map(|(index, (name, value))| Parameter {
+            name,
+            index,
+            value,
+            writable: Writable::Anything,
+        });
+        Self::with_parameters(list.collect(), encoding)
+    }
+
+    /// With indices of its own, which may leave places free.
+    pub fn with_parameters(mut list: Vec<Parameter>, encoding: IntegerEncoding) -> Self {
+        list.sort_by_key(|parameter| parameter.index);
+        Self {
+            list,
+            encoding,
+            has_hash: false,
+            flash: None,
+            pending: VecDeque::new(),
+            next: Timestamp::ZERO,
+            echoes: Vec::new(),
+        }
     }
 
     /// Also offers `_HASH_CHECK`, as PX4 does.
@@ -60,8 +115,20 @@ impl ParameterServer {
         self
     }
 
+    /// Tells what was written only after `least`, or as much as `spread` later.
+    pub fn with_flash(mut self, least: Duration, spread: Duration, seed: u64) -> Self {
+        self.flash = Some(Flash { least, spread, random: Random::new(seed) });
+        self
+    }
+
     pub fn value(&self, name: &str) -> Option<ParameterValue> {
-        self.list.iter().find(|(known, _)| *known == name).map(|(_, value)| *value)
+        self.list.iter().find(|parameter| parameter.name == name).map(|parameter| parameter.value)
+    }
+
+    /// Forgets what is still to be told, as at a restart; the values stay.
+    pub fn forget_questions(&mut self) {
+        self.pending.clear();
+        self.echoes.clear();
     }
 
     /// Takes a frame that addresses this component; true when it was one of the parameter protocol.
@@ -80,12 +147,14 @@ impl ParameterServer {
             message::PARAM_REQUEST_READ => {
                 let Some(request) = frame.decode::<PARAM_REQUEST_READ_DATA>() else { return true };
                 let name = request.param_id.to_str().unwrap_or("");
-                if let Ok(index) = usize::try_from(request.param_index) {
-                    self.send(index, outbox);
+                if let Ok(index) = u16::try_from(request.param_index) {
+                    if let Some(place) = self.list.iter().position(|parameter| parameter.index == index) {
+                        self.send(place, outbox);
+                    }
                 } else if self.has_hash && name == HASH_CHECK {
                     self.send_hash(outbox);
-                } else if let Some(index) = self.list.iter().position(|(known, _)| *known == name) {
-                    self.send(index, outbox);
+                } else if let Some(place) = self.place(name) {
+                    self.send(place, outbox);
                 }
             }
             message::PARAM_SET => {
@@ -94,10 +163,15 @@ impl ParameterServer {
                 if self.has_hash && name == HASH_CHECK {
                     // A client whose copy has this checksum says so, and the list need not be sent.
                     self.pending.clear();
-                } else if let Some(index) = self.list.iter().position(|(known, _)| *known == name) {
-                    let old = self.list[index].1;
-                    self.list[index].1 = self.decode(old, set.param_value);
-                    self.send(index, outbox);
+                } else if let Some(place) = self.place(name) {
+                    self.write(place, set.param_value);
+                    match &mut self.flash {
+                        Some(flash) => {
+                            let delay = flash.least + flash.spread.mul_f64(flash.random.unit());
+                            self.echoes.push((now + delay, place));
+                        }
+                        None => self.send(place, outbox),
+                    }
                 }
             }
             _ => return false,
@@ -107,41 +181,83 @@ impl ParameterServer {
 
     pub fn handle_timeout(&mut self, now: Timestamp, outbox: &mut Outbox) {
         while self.next <= now
-            && let Some(index) = self.pending.pop_front()
+            && let Some(place) = self.pending.pop_front()
         {
-            self.send(index, outbox);
+            self.send(place, outbox);
             self.next += LIST_INTERVAL;
+        }
+        while let Some(due) = self.echoes.iter().position(|(at, _)| *at <= now) {
+            let (_, place) = self.echoes.remove(due);
+            self.send(place, outbox);
         }
     }
 
     pub fn poll_timeout(&self) -> Option<Timestamp> {
-        (!self.pending.is_empty()).then_some(self.next)
+        let list = (!self.pending.is_empty()).then_some(self.next);
+        self.echoes.iter().map(|(at, _)| *at).chain(list).min()
+    }
+
+    fn place(&self, name: &str) -> Option<usize> {
+        self.list.iter().position(|parameter| parameter.name == name)
+    }
+
+    /// A value that may not be written leaves the old one.
+    fn write(&mut self, place: usize, raw: f32) {
+        let Parameter { value: old, writable, .. } = &self.list[place];
+        let new = self.decode(*old, raw);
+        let number = match new {
+            ParameterValue::Short(value) => f64::from(value),
+            ParameterValue::Integer(value) => f64::from(value),
+            ParameterValue::Float(value) => f64::from(value),
+        };
+        let may = match writable {
+            Writable::Anything => true,
+            Writable::Within(range) => (f64::from(*range.start())..=f64::from(*range.end())).contains(&number),
+            Writable::Nothing => false,
+        };
+        if may {
+            self.list[place].value = new;
+        }
     }
 
     fn decode(&self, old: ParameterValue, raw: f32) -> ParameterValue {
+        // A float cast saturates, and turns NaN into 0.
         match (old, self.encoding) {
             (ParameterValue::Float(_), _) => ParameterValue::Float(raw),
             (ParameterValue::Integer(_), IntegerEncoding::Bytewise) => {
                 ParameterValue::Integer(raw.to_bits().cast_signed())
             }
             (ParameterValue::Integer(_), IntegerEncoding::CCast) => ParameterValue::Integer(raw.round() as i32),
+            (ParameterValue::Short(_), IntegerEncoding::Bytewise) => {
+                ParameterValue::Short((raw.to_bits() as u16).cast_signed())
+            }
+            (ParameterValue::Short(_), IntegerEncoding::CCast) => ParameterValue::Short(raw.round() as i16),
         }
     }
 
-    fn send(&self, index: usize, outbox: &mut Outbox) {
-        let Some((name, value)) = self.list.get(index) else { return };
+    fn send(&self, place: usize, outbox: &mut Outbox) {
+        let Parameter { name, index, value, .. } = &self.list[place];
         let (param_value, param_type) = match (*value, self.encoding) {
             (ParameterValue::Float(value), _) => (value, REAL32),
             (ParameterValue::Integer(value), IntegerEncoding::Bytewise) => (f32::from_bits(bits(value)), INT32),
             (ParameterValue::Integer(value), IntegerEncoding::CCast) => (value as f32, INT32),
+            (ParameterValue::Short(value), IntegerEncoding::Bytewise) => {
+                (f32::from_bits(u32::from(value.cast_unsigned())), INT16)
+            }
+            (ParameterValue::Short(value), IntegerEncoding::CCast) => (f32::from(value), INT16),
         };
         outbox.send(&PARAM_VALUE_DATA {
             param_id: CharArray::from(*name),
             param_value,
             param_type,
-            param_count: self.list.len() as u16,
-            param_index: index as u16,
+            param_count: self.count(),
+            param_index: *index,
         });
+    }
+
+    /// With the places that are free.
+    fn count(&self) -> u16 {
+        self.list.last().map_or(0, |parameter| parameter.index + 1)
     }
 
     fn send_hash(&self, outbox: &mut Outbox) {
@@ -149,7 +265,7 @@ impl ParameterServer {
             param_id: CharArray::from(HASH_CHECK),
             param_value: f32::from_bits(self.hash()),
             param_type: UINT32,
-            param_count: self.list.len() as u16,
+            param_count: self.count(),
             param_index: u16::MAX,
         });
     }
@@ -157,8 +273,9 @@ impl ParameterServer {
     /// CRC-32 over name and value bits of every parameter in order, started at 0 and not inverted at the end.
     fn hash(&self) -> u32 {
         let mut crc = 0;
-        for (name, value) in &self.list {
+        for Parameter { name, value, .. } in &self.list {
             let bits = match *value {
+                ParameterValue::Short(value) => bits(i32::from(value)),
                 ParameterValue::Integer(value) => bits(value),
                 ParameterValue::Float(value) => value.to_bits(),
             };
@@ -258,5 +375,43 @@ mod tests {
         assert_eq!(names(&ask(&mut server, Timestamp::ZERO, &read("A", -1))), ["A"]);
         assert_eq!(names(&ask(&mut server, Timestamp::ZERO, &read("_HASH_CHECK", -1))), ["_HASH_CHECK"]);
         assert!(ask(&mut server, Timestamp::ZERO, &read("", 2)).is_empty());
+    }
+
+    /// A gimbal whose parameters have places of their own: some are free, some are not to be written, and what was
+    /// written is told back late.
+    #[test]
+    fn places_may_be_free_and_writing_may_take_time() {
+        let parameter =
+            |name, index, value, writable| Parameter { name, index, value: ParameterValue::Short(value), writable };
+        let list =
+            vec![parameter("LAST", 7, -5, Writable::Within(-10..=10)), parameter("FIRST", 0, 1, Writable::Nothing)];
+        let (least, spread) = (Duration::from_millis(20), Duration::from_millis(180));
+        let mut server = ParameterServer::with_parameters(list, IntegerEncoding::CCast).with_flash(least, spread, 1);
+        let set = |name: &str, param_value| PARAM_SET_DATA {
+            target_system: 1,
+            target_component: 1,
+            param_id: CharArray::from(name),
+            param_value,
+            param_type: INT16,
+        };
+
+        for (name, written, expected) in [("LAST", 9.0, 9.0), ("LAST", 11.0, 9.0), ("FIRST", 2.0, 1.0)] {
+            assert!(ask(&mut server, Timestamp::ZERO, &set(name, written)).is_empty());
+            let at = server.poll_timeout().expect("an echo to come");
+            assert!((Timestamp::from_millis(20)..=Timestamp::from_millis(200)).contains(&at), "{at:?}");
+            let mut outbox = Outbox::new(MavId::new(1, 1));
+            server.handle_timeout(at, &mut outbox);
+            let echo = drain(&mut outbox);
+            assert_eq!((names(&echo), echo[0].param_value, echo[0].param_type), (vec![name], expected, INT16));
+            assert_eq!(echo[0].param_count, 8);
+        }
+        let read = |param_index| PARAM_REQUEST_READ_DATA {
+            target_system: 1,
+            target_component: 1,
+            param_id: CharArray::from(""),
+            param_index,
+        };
+        assert_eq!(names(&ask(&mut server, Timestamp::ZERO, &read(7))), ["LAST"]);
+        assert!(ask(&mut server, Timestamp::ZERO, &read(1)).is_empty());
     }
 }

@@ -153,6 +153,9 @@ pub struct Plant {
     yaw: Joint,
     yaw_hold: YawHold,
     motors_on: bool,
+    /// The fastest that roll, pitch and yaw turn when they are told to; holding against the vehicle may take more.
+    speed_limits: [AngularRate; 3],
+    takes_direct_way: bool,
     platform: PlatformMotion,
     platform_at: Timestamp,
     has_heading_reference: bool,
@@ -174,6 +177,8 @@ impl Plant {
             yaw: Joint::at(initial.yaw),
             yaw_hold: YawHold::Vehicle,
             motors_on: true,
+            speed_limits: [settings.max_rate; 3],
+            takes_direct_way: false,
             platform: PlatformMotion::default(),
             platform_at: now,
             has_heading_reference: false,
@@ -210,6 +215,24 @@ impl Plant {
     /// Whether a heading from outside keeps the held direction from drifting.
     pub fn set_heading_reference(&mut self, known: bool) {
         self.has_heading_reference = known;
+    }
+
+    /// Moves the end stops. Joints beyond them come back.
+    pub fn set_limits(&mut self, limits: Limits) {
+        self.settings.limits = limits;
+    }
+
+    pub fn limits(&self) -> Limits {
+        self.settings.limits
+    }
+
+    pub fn set_speed_limits(&mut self, roll_pitch_yaw: [AngularRate; 3]) {
+        self.speed_limits = roll_pitch_yaw;
+    }
+
+    /// Whether yaw goes to the very angle it is told, and not to the same direction the shorter way round.
+    pub fn set_direct_way(&mut self, direct: bool) {
+        self.takes_direct_way = direct;
     }
 
     pub fn set_roll(&mut self, drive: Drive) {
@@ -272,6 +295,15 @@ impl Plant {
         self.platform.heading + self.platform.heading_rate.over(age.min(EXTRAPOLATION))
     }
 
+    /// What has to be added to the yaw joint's angle to have what [`YawHold::Horizon`] counts.
+    pub fn horizon(&self, now: Timestamp) -> Angle {
+        self.platform_heading(now) + self.drifted()
+    }
+
+    pub fn motors_on(&self) -> bool {
+        self.motors_on
+    }
+
     pub fn at_limit(&self) -> AtLimit {
         self.at_limit
     }
@@ -323,7 +355,7 @@ impl Plant {
         };
         let yaw = match (self.yaw_hold, self.yaw.drive) {
             (YawHold::Vehicle, Drive::To { angle, .. }) => {
-                arrived(&self.yaw, self.settings.limits.clamp_yaw(angle, self.yaw.angle()))
+                arrived(&self.yaw, yaw_goal(&self.settings.limits, self.takes_direct_way, angle, self.yaw.angle()))
             }
             _ => false,
         };
@@ -385,13 +417,17 @@ impl Plant {
                 self.platform.heading_rate.radians_per_second(),
             ),
         };
-        let Self { settings, roll, pitch, yaw, .. } = self;
+        let Self { settings, roll, pitch, yaw, speed_limits, takes_direct_way, .. } = self;
         let limits = settings.limits;
         let level = (Angle::ZERO, 0.0);
+        let [roll_speed, pitch_speed, yaw_speed] = *speed_limits;
+        let direct = *takes_direct_way;
         self.at_limit = AtLimit {
-            roll: follow(settings, roll, limits.roll, level, |angle, _| limits.clamp_roll(angle)),
-            pitch: follow(settings, pitch, limits.pitch, level, |angle, _| limits.clamp_pitch(angle)),
-            yaw: follow(settings, yaw, limits.yaw, (heading, turning), |angle, from| limits.clamp_yaw(angle, from)),
+            roll: follow(settings, roll_speed, roll, limits.roll, level, |angle, _| limits.clamp_roll(angle)),
+            pitch: follow(settings, pitch_speed, pitch, limits.pitch, level, |angle, _| limits.clamp_pitch(angle)),
+            yaw: follow(settings, yaw_speed, yaw, limits.yaw, (heading, turning), |angle, from| {
+                yaw_goal(&limits, direct, angle, from)
+            }),
         };
     }
 
@@ -407,12 +443,18 @@ impl Plant {
     }
 }
 
+/// The angle of the yaw joint for one that it is told.
+fn yaw_goal(limits: &Limits, direct: bool, angle: Angle, from: Angle) -> Angle {
+    if direct { limits.yaw.map_or(angle, |limits| limits.clamp(angle)) } else { limits.clamp_yaw(angle, from) }
+}
+
 /// One step of one joint; true when it is told to go further than it can and stands at the limit.
 ///
 /// `base` is what the drive counts from, as an angle of the joint, and how fast it turns in radians per second;
 /// `reach` gives the joint angle to go to for the one that is wanted and the one it has.
 fn follow(
     settings: &PlantSettings,
+    speed_limit: AngularRate,
     joint: &mut Joint,
     limits: Option<AxisLimits>,
     base: (Angle, f64),
@@ -424,7 +466,7 @@ fn follow(
     let at_max = limits.is_some_and(|limits| limits.max() - joint.angle() < AT_LIMIT);
     let (wanted_rate, stuck) = match joint.drive {
         Drive::Turn(rate) => {
-            let rate = rate.radians_per_second() + carried;
+            let rate = rate.clamp(-speed_limit, speed_limit).radians_per_second() + carried;
             // Brake in time for the end stop.
             let room = |end: Angle| GAIN * (end.radians() - joint.angle);
             let bounded =
@@ -441,7 +483,9 @@ fn follow(
                 joint.rate = 0.0;
                 return out_of_reach;
             }
-            let speed = speed.map_or(max_rate, |speed| speed.abs().radians_per_second());
+            let speed = speed
+                .map_or(speed_limit, |speed| speed.abs().clamp(AngularRate::ZERO, speed_limit))
+                .radians_per_second();
             let carried = if out_of_reach { 0.0 } else { carried };
             ((GAIN * error).clamp(-speed, speed) + carried, out_of_reach && (at_min || at_max))
         }

@@ -16,20 +16,17 @@ pub use settings::{DeviceSettings, Retract, StatusFrame, Strictness};
 
 use self::latch::ManagerLatch;
 use self::steering::Steering;
-use crate::geometry::{Angle, AngularRate, Attitude, EarthFrame};
+use crate::geometry::Angle;
 use crate::sim::command::Command;
 use crate::sim::component::{Component, Line};
-use crate::sim::heading::{HeadingBelief, HeadingSource};
+use crate::sim::heading::HeadingBelief;
 use crate::sim::parameters::{IntegerEncoding, ParameterServer, ParameterValue};
 use crate::sim::peer::PlatformMotion;
 use crate::sim::plant::Plant;
 use crate::sim::streams::Streams;
 pub use crate::sim::system_id::SystemId;
 use crate::timestamp::Timestamp;
-use crate::wire::dialect::{
-    ATTITUDE_DATA, AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA, GIMBAL_MANAGER_STATUS_DATA, HEARTBEAT_DATA,
-    STORM32_GIMBAL_MANAGER_STATUS_DATA,
-};
+use crate::wire::dialect::{GIMBAL_MANAGER_STATUS_DATA, HEARTBEAT_DATA, STORM32_GIMBAL_MANAGER_STATUS_DATA};
 use crate::wire::ids::{CommandResult, FailureFlags, command, component, mav_type, message};
 use crate::wire::{Frame, MavId};
 
@@ -152,12 +149,8 @@ impl Device {
             if status.gimbal_id == self.settings.component_id {
                 self.latch.handle_announcement(now, sender);
             }
-        } else if let Some(state) = frame.decode() {
-            self.handle_autopilot_state(now, &state);
-        } else if sender.component == component::AUTOPILOT1
-            && let Some(attitude) = frame.decode()
-        {
-            self.handle_attitude(now, &attitude);
+        } else if let Some(motion) = self.heading.handle_frame(now, frame) {
+            self.ride(now, motion);
         }
     }
 
@@ -205,36 +198,12 @@ impl Device {
         }
     }
 
-    fn handle_autopilot_state(&mut self, now: Timestamp, state: &AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA) {
-        let Ok(Some(attitude)) = Attitude::<EarthFrame>::from_wxyz(state.q) else { return };
-        // Zero stands for unknown in this field.
-        let rate = f64::from(state.angular_velocity_z);
-        let rate = (rate.is_finite() && rate != 0.0).then(|| AngularRate::from_radians_per_second(rate));
-        let taken = self.heading.handle_heading(now, HeadingSource::State, attitude.heading(), rate);
-        self.ride(now, taken, [0.0, 0.0]);
-    }
-
-    fn handle_attitude(&mut self, now: Timestamp, attitude: &ATTITUDE_DATA) {
-        let [yaw, roll_rate, pitch_rate, yaw_rate] =
-            [attitude.yaw, attitude.rollspeed, attitude.pitchspeed, attitude.yawspeed].map(f64::from);
-        if !yaw.is_finite() {
-            return;
-        }
-        let rate = yaw_rate.is_finite().then(|| AngularRate::from_radians_per_second(yaw_rate));
-        let taken = self.heading.handle_heading(now, HeadingSource::Attitude, Angle::from_radians(yaw), rate);
-        let finite = |rate: f64| if rate.is_finite() { rate } else { 0.0 };
-        self.ride(now, taken, [finite(roll_rate), finite(pitch_rate)]);
-    }
-
     /// Moves with the vehicle as the autopilot tells it, unless the vehicle's own motion is known.
-    fn ride(&mut self, now: Timestamp, is_news: bool, roll_and_pitch_rate: [f64; 2]) {
-        let Some((heading, heading_rate)) = self.heading.at(now) else { return };
-        if self.is_carried || !is_news {
-            return;
+    fn ride(&mut self, now: Timestamp, motion: PlatformMotion) {
+        if !self.is_carried {
+            let heading = motion.heading.nearest_to(self.plant.platform_heading(now));
+            self.plant.set_platform(now, PlatformMotion { heading, ..motion });
         }
-        let [roll_rate, pitch_rate] = roll_and_pitch_rate.map(AngularRate::from_radians_per_second);
-        let heading = heading.nearest_to(self.plant.platform_heading(now));
-        self.plant.set_platform(now, PlatformMotion { heading, heading_rate, roll_rate, pitch_rate });
     }
 }
 

@@ -1,10 +1,11 @@
 use super::*;
-use crate::geometry::{AircraftAngles, AxisLimits, GimbalAngles, Limits};
+use crate::geometry::{AircraftAngles, AngularRate, Attitude, AxisLimits, EarthFrame, GimbalAngles, Limits};
 use crate::sim::peer::Peer;
 use crate::sim::plant::PlantSettings;
 use crate::wire::dialect::{
-    COMMAND_ACK_DATA, COMMAND_LONG_DATA, CharArray, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA,
-    GIMBAL_DEVICE_SET_ATTITUDE_DATA, MESSAGE_INTERVAL_DATA, MessageData, PARAM_REQUEST_LIST_DATA, PARAM_VALUE_DATA,
+    ATTITUDE_DATA, AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA, COMMAND_ACK_DATA, COMMAND_LONG_DATA, CharArray,
+    GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA,
+    MESSAGE_INTERVAL_DATA, MessageData, PARAM_REQUEST_LIST_DATA, PARAM_VALUE_DATA,
 };
 use crate::wire::ids::GimbalFlags;
 use crate::wire::{DatagramFrames, encode_to_vec};
