@@ -7,6 +7,7 @@ pub mod modes;
 pub mod packet;
 pub mod parameters;
 pub mod readings;
+pub mod sim;
 pub mod status;
 pub mod version;
 

@@ -2,6 +2,7 @@
 
 use std::cmp::Ordering;
 use std::fmt;
+use std::str::FromStr;
 
 /// A firmware version as the vendor writes it, such as `7.8.9 alpha`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -133,6 +134,23 @@ impl PartialOrd for FirmwareVersion {
     }
 }
 
+/// Why a text is no firmware version.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("expected three numbers such as 7.8.9")]
+pub struct VersionError;
+
+impl FromStr for FirmwareVersion {
+    type Err = VersionError;
+
+    /// Reads an official version, such as `7.8.9`.
+    fn from_str(text: &str) -> Result<Self, VersionError> {
+        let numbers: Vec<u8> = text.split('.').map(str::parse).collect::<Result<_, _>>().map_err(|_| VersionError)?;
+        let [x, y, z] = numbers[..] else { return Err(VersionError) };
+        // The parameter VERSION_Z has no room for more.
+        if z > !STAGE_BITS { Err(VersionError) } else { Ok(Self::official(x, y, z)) }
+    }
+}
+
 impl fmt::Display for FirmwareVersion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}.{}.{}{}", self.x, self.y, self.z, self.stage.suffix())
@@ -174,6 +192,14 @@ mod tests {
             let version = FirmwareVersion::from_parameters(x, y, z);
             assert_eq!(version.to_string(), expected);
             assert_eq!(version.to_parameters(), [x, y, z]);
+        }
+    }
+
+    #[test]
+    fn a_version_is_read_as_it_is_written() {
+        assert_eq!("7.8.9".parse(), Ok(FirmwareVersion::official(7, 8, 9)));
+        for text in ["", "7.8", "7.8.9.1", "7.8.x", "7.8.64", "7.8.256", "7.8.9 alpha"] {
+            assert_eq!(text.parse::<FirmwareVersion>(), Err(VersionError), "{text:?}");
         }
     }
 
