@@ -10,6 +10,8 @@ use crate::config::{DEFAULT_FILE, settings::HttpSettings};
 use crate::daemon::logging::LogFilter;
 use crate::endpoint::Endpoint;
 use crate::exit_code::ExitCode;
+use crate::gimbals::gremsy::parameters::RcType;
+use crate::gimbals::gremsy::version::FirmwareVersion;
 use crate::sim::faults::WORDS;
 
 const ENDPOINTS: &str = "\
@@ -75,6 +77,7 @@ Examples:
   gimbald demo                                   then open http://127.0.0.1:8080 and QGroundControl
   gimbald demo --ground udpbcast:192.168.1.255:14550
   gimbald demo --duration 10
+  gimbald demo --family gremsy --gremsy-generation v1
 
 {ENDPOINTS}"))]
     Demo(DemoArgs),
@@ -129,6 +132,9 @@ pub struct DemoArgs {
     #[arg(long, value_name = "FAMILY", value_enum, default_value_t = SimulatedFamily::MavlinkV2)]
     pub family: SimulatedFamily,
 
+    #[command(flatten)]
+    pub gremsy: GremsyArgs,
+
     /// End after so many seconds; without it, at Ctrl-C
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(1..))]
     pub duration: Option<u32>,
@@ -142,6 +148,7 @@ Examples:
   gimbald sim gimbal --endpoint udpout:127.0.0.1:14541
   gimbald sim gimbal --endpoint serial:/dev/ttyUSB1:115200 --component-id 171
   gimbald sim gimbal --endpoint udpout:127.0.0.1:14540 --system-id 33 --slew 80 --yaw-range 160
+  gimbald sim gimbal --endpoint udpout:127.0.0.1:14541 --family gremsy --gremsy-firmware 7.8.7
   gimbald sim gimbal --endpoint tcpin:0.0.0.0:5790 --fault drop=0.1 --fault reboot@20s --seed 7
 
 Faults: {WORDS}.
@@ -195,11 +202,11 @@ pub struct SimGimbalArgs {
     #[arg(long, value_name = "FRAME", value_enum, default_value_t = SimulatedStatusFrame::Earth)]
     pub status_frame: SimulatedStatusFrame,
 
-    /// How fast the gimbal turns at most, degrees per second
-    #[arg(long, value_name = "DPS", default_value_t = 100.0, value_parser = slew)]
-    pub slew: f64,
+    /// How fast the gimbal turns at most, degrees per second; without it 100, and 30 with family gremsy
+    #[arg(long, value_name = "DPS", value_parser = slew)]
+    pub slew: Option<f64>,
 
-    /// How far the gimbal yaws to either side, degrees; without it, it turns without end
+    /// How far the gimbal yaws to either side, degrees; without it, without end, or as far as its family does
     #[arg(long, value_name = "DEG", value_parser = yaw_range)]
     pub yaw_range: Option<f64>,
 
@@ -210,6 +217,48 @@ pub struct SimGimbalArgs {
     /// A gimbal of family mavlink_v1 counts pitch and yaw the other way round, as ArduPilot does towards a STorM32
     #[arg(long)]
     pub v1_reversed: bool,
+
+    #[command(flatten)]
+    pub gremsy: GremsyArgs,
+}
+
+/// Which gimbal of family gremsy.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Options of family gremsy")]
+pub struct GremsyArgs {
+    /// Which protocol it is steered by
+    #[arg(long, value_name = "GENERATION", value_enum, default_value_t = SimulatedGeneration::V2)]
+    pub gremsy_generation: SimulatedGeneration,
+
+    /// Its firmware, 7.7.3 or later for v2; before that a gimbal has the parameters of 2021. Without it 7.7.3 (v1) or
+    /// 7.8.9 (v2)
+    #[arg(long, value_name = "X.Y.Z")]
+    pub gremsy_firmware: Option<FirmwareVersion>,
+
+    /// Where control comes from, by name (sbus_fasst, joystick …) or number; with any but sync it acknowledges and does
+    /// not move
+    #[arg(long, value_name = "TYPE", default_value = "sync", value_parser = rc_type)]
+    pub gremsy_rc_type: RcType,
+
+    /// Send orientation, encoders, IMU and attitude only when asked for, as the AEVO series does
+    #[arg(long)]
+    pub gremsy_quiet: bool,
+
+    /// Tell pitch in MOUNT_ORIENTATION the wrong way round
+    #[arg(long)]
+    pub gremsy_inverted_pitch: bool,
+
+    /// Take motors that RETRACT switched off back only after a restart
+    #[arg(long)]
+    pub gremsy_latched: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SimulatedGeneration {
+    /// DO_MOUNT_CONTROL and the vendor's own commands
+    V1,
+    /// The MAVLink Gimbal Protocol v2
+    V2,
 }
 
 #[derive(Debug, Args)]
@@ -269,6 +318,9 @@ pub enum SimulatedFamily {
     /// A gimbal that is told where to look by DO_MOUNT_CONTROL
     #[value(name = "mavlink_v1")]
     MavlinkV1,
+    /// A gimbal by Gremsy
+    #[value(name = "gremsy")]
+    Gremsy,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -329,6 +381,16 @@ fn slew(text: &str) -> Result<f64, DegreesError> {
     degrees(text, 1, 1000)
 }
 
+/// Why a text is no RC type.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("expected a number from 0 to 31, or one of {}", RcType::names().collect::<Vec<_>>().join(", "))]
+pub struct RcTypeError;
+
+fn rc_type(text: &str) -> Result<RcType, RcTypeError> {
+    let number = text.parse().ok().filter(|code| (0..=31).contains(code)).map(RcType::from_code);
+    RcType::from_name(text).or(number).ok_or(RcTypeError)
+}
+
 fn yaw_range(text: &str) -> Result<f64, DegreesError> {
     degrees(text, 1, 360)
 }
@@ -385,6 +447,8 @@ mod tests {
             ("gimbald sim gimbal --endpoint udpin:127.0.0.1:1 --slew 0", ExitCode::Usage),
             ("gimbald sim gimbal --endpoint udpin:127.0.0.1:1 --slew NaN", ExitCode::Usage),
             ("gimbald sim gimbal --endpoint udpin:127.0.0.1:1 --yaw-range 361", ExitCode::Usage),
+            ("gimbald sim gimbal --endpoint udpin:127.0.0.1:1 --family gremsy --gremsy-firmware 7.8", ExitCode::Usage),
+            ("gimbald sim gimbal --endpoint udpin:127.0.0.1:1 --family gremsy --gremsy-rc-type radio", ExitCode::Usage),
             ("gimbald demo --duration 0", ExitCode::Usage),
         ] {
             assert_eq!(read(line).map(|_| ()), Err(code), "{line}");

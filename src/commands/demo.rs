@@ -13,14 +13,15 @@ use tokio::sync::oneshot;
 
 use crate::bridge::settings::{Role, Settings};
 use crate::cli::{DemoArgs, SimulatedFamily};
+use crate::commands::sim::{NoSuchGremsy, gremsy_settings};
 use crate::config::settings::{DaemonSettings, Directories, HttpSettings, link_on};
 use crate::daemon::clock::unix_time_us;
 use crate::daemon::supervisor;
 use crate::endpoint::Endpoint;
 use crate::exit_code::ExitCode;
-use crate::gimbals::mavlink_v1;
 use crate::gimbals::mavlink_v2::sim::{Device, DeviceSettings};
 use crate::gimbals::settings::{Family, GimbalSettings};
+use crate::gimbals::{gremsy, mavlink_v1};
 use crate::links::{self, Link};
 use crate::sim::host::{self, HostError};
 use crate::sim::peer::Peer;
@@ -44,6 +45,8 @@ enum DemoError {
     },
     #[error("UDP port {CLIENT}, where a second client connects, is taken (does another demo run?)")]
     Client(#[source] io::Error),
+    #[error(transparent)]
+    Gimbal(#[from] NoSuchGremsy),
     #[error("no pseudo-terminal for the gimbal")]
     Pty(#[source] io::Error),
     #[error("no UDP port for the vehicle")]
@@ -58,6 +61,11 @@ enum DemoError {
 pub fn demo(arguments: &DemoArgs, output: &mut impl Write, errors: &mut impl Write) -> ExitCode {
     match run(arguments, output) {
         Ok(()) => ExitCode::Ok,
+        Err(DemoError::Gimbal(error)) => {
+            // As below.
+            let _ = writeln!(errors, "gimbald demo: {error}");
+            ExitCode::Usage
+        }
         Err(error) => {
             let cause = std::error::Error::source(&error).map(|cause| format!(": {cause}")).unwrap_or_default();
             // The exit code says it too; nobody is left to tell when the reader is gone.
@@ -89,6 +97,10 @@ fn run(arguments: &DemoArgs, output: &mut impl Write) -> Result<(), DemoError> {
             let device = mavlink_v1::sim::Device::new(Timestamp::ZERO, mavlink_v1::sim::DeviceSettings::default());
             Simulation::start("gimbal", device, move || Ok(Box::new(cable.into_link()?)))?
         }
+        SimulatedFamily::Gremsy => {
+            let device = gremsy::sim::Device::new(Timestamp::ZERO, gremsy_settings(&arguments.gremsy)?);
+            Simulation::start("gimbal", device, move || Ok(Box::new(cable.into_link()?)))?
+        }
     };
     if let Some(seconds) = arguments.duration {
         end_after(Duration::from_secs(u64::from(seconds))).map_err(DemoError::Thread)?;
@@ -111,7 +123,8 @@ fn daemon_settings(arguments: &DemoArgs, gimbal: Endpoint, autopilot: SocketAddr
     ];
     let links = all.iter().map(|(name, role, endpoint)| link_on((*name).to_owned(), *role, endpoint)).collect();
     let gimbals = match arguments.family {
-        SimulatedFamily::MavlinkV2 => Vec::new(),
+        // What it speaks is found out.
+        SimulatedFamily::MavlinkV2 | SimulatedFamily::Gremsy => Vec::new(),
         SimulatedFamily::MavlinkV1 => {
             vec![GimbalSettings { family: Family::MavlinkV1, ..GimbalSettings::found("camera".to_owned()) }]
         }

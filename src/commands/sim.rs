@@ -4,16 +4,18 @@ use std::io::Write;
 use std::time::Duration;
 
 use crate::cli::{
-    SimCommand, SimGimbalArgs, SimVehicleArgs, SimulatedAutopilot, SimulatedFamily, SimulatedFrames,
-    SimulatedGimbalOutput, SimulatedReports, SimulatedStatusFrame,
+    GremsyArgs, SimCommand, SimGimbalArgs, SimVehicleArgs, SimulatedAutopilot, SimulatedFamily, SimulatedFrames,
+    SimulatedGeneration, SimulatedGimbalOutput, SimulatedReports, SimulatedStatusFrame,
 };
 use crate::daemon::clock::unix_time_us;
 use crate::endpoint::Endpoint;
 use crate::exit_code::ExitCode;
 use crate::geometry::{Angle, AngularRate, AxisLimits, Limits};
-use crate::gimbals::mavlink_v1;
+use crate::gimbals::gremsy::sim::Generation;
+use crate::gimbals::gremsy::version::FirmwareVersion;
 use crate::gimbals::mavlink_v2::sim::{Device, DeviceSettings, StatusFrame, Strictness, SystemId};
 use crate::gimbals::signs::Signs;
+use crate::gimbals::{gremsy, mavlink_v1};
 use crate::links;
 use crate::sim::faults::{Faults, FaultyPeer};
 use crate::sim::host;
@@ -22,6 +24,8 @@ use crate::sim::plant::PlantSettings;
 use crate::sim::vehicle::{Autopilot, ClientVersion, GimbalOutput, StateForGimbals, Vehicle, VehicleSettings};
 use crate::timestamp::Timestamp;
 use crate::wire::ids::CapFlags;
+
+const DEFAULT_SLEW_DPS: f64 = 100.0;
 
 /// Runs the simulated peer until SIGTERM or SIGINT.
 pub fn sim(command: &SimCommand, errors: &mut impl Write) -> ExitCode {
@@ -49,7 +53,58 @@ pub fn run_sim_gimbal(arguments: &SimGimbalArgs, errors: &mut impl Write) -> Exi
             let device = mavlink_v1::sim::Device::new(Timestamp::ZERO, v1_settings(arguments));
             run(FaultyPeer::new(device, faults), &arguments.endpoint, errors)
         }
+        SimulatedFamily::Gremsy => match gremsy_settings_on_link(arguments) {
+            Ok(settings) => {
+                let device = gremsy::sim::Device::new(Timestamp::ZERO, settings);
+                run(FaultyPeer::new(device, faults), &arguments.endpoint, errors)
+            }
+            Err(error) => {
+                // As above.
+                let _ = writeln!(errors, "gimbald sim gimbal: {error}");
+                ExitCode::Usage
+            }
+        },
     }
+}
+
+/// Why there is no such Gremsy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("--gremsy-firmware {0}: before 7.7.3 there is no v2; add --gremsy-generation v1")]
+pub struct NoSuchGremsy(FirmwareVersion);
+
+/// The gimbal that the arguments describe, under the system id of the first vehicle it hears.
+pub fn gremsy_settings(arguments: &GremsyArgs) -> Result<gremsy::sim::DeviceSettings, NoSuchGremsy> {
+    let generation = match arguments.gremsy_generation {
+        SimulatedGeneration::V1 => Generation::V1,
+        SimulatedGeneration::V2 => Generation::V2,
+    };
+    let defaults = gremsy::sim::DeviceSettings::of(generation);
+    let firmware = arguments.gremsy_firmware.unwrap_or(defaults.firmware);
+    if generation == Generation::V2 && !firmware.may_speak_v2() {
+        return Err(NoSuchGremsy(firmware));
+    }
+    Ok(gremsy::sim::DeviceSettings {
+        firmware,
+        rc_type: arguments.gremsy_rc_type,
+        has_usual_streams: !arguments.gremsy_quiet,
+        has_inverted_pitch: arguments.gremsy_inverted_pitch,
+        is_latched_by_retract: arguments.gremsy_latched,
+        ..defaults
+    })
+}
+
+fn gremsy_settings_on_link(arguments: &SimGimbalArgs) -> Result<gremsy::sim::DeviceSettings, NoSuchGremsy> {
+    let settings = gremsy_settings(&arguments.gremsy)?;
+    let yaw = arguments.yaw_range.map(Angle::from_degrees).and_then(|range| AxisLimits::new(-range, range));
+    let limits = Limits { yaw: yaw.or(settings.plant.limits.yaw), ..settings.plant.limits };
+    Ok(gremsy::sim::DeviceSettings {
+        component_id: arguments.component_id,
+        system_id: SystemId::Fixed(arguments.system_id),
+        // The gimbal takes whole degrees per second, up to 255; a float cast saturates.
+        control_speed_dps: arguments.slew.map_or(settings.control_speed_dps, |slew| i16::from(slew.round() as u8)),
+        plant: PlantSettings { limits, ..settings.plant },
+        ..settings
+    })
 }
 
 fn v1_settings(arguments: &SimGimbalArgs) -> mavlink_v1::sim::DeviceSettings {
@@ -68,7 +123,7 @@ fn v1_settings(arguments: &SimGimbalArgs) -> mavlink_v1::sim::DeviceSettings {
         },
         plant: PlantSettings {
             limits: Limits { yaw: yaw.or(defaults.plant.limits.yaw), ..defaults.plant.limits },
-            ..defaults.plant.clone().with_max_rate(AngularRate::from_degrees_per_second(arguments.slew))
+            ..defaults.plant.clone().with_max_rate(slew(arguments))
         },
         ..defaults
     }
@@ -99,10 +154,15 @@ fn device_settings(arguments: &SimGimbalArgs) -> DeviceSettings {
         },
         plant: PlantSettings {
             limits: Limits { yaw, ..defaults.plant.limits },
-            ..defaults.plant.clone().with_max_rate(AngularRate::from_degrees_per_second(arguments.slew))
+            ..defaults.plant.clone().with_max_rate(slew(arguments))
         },
         ..defaults
     }
+}
+
+/// How fast a gimbal that is no Gremsy turns.
+fn slew(arguments: &SimGimbalArgs) -> AngularRate {
+    AngularRate::from_degrees_per_second(arguments.slew.unwrap_or(DEFAULT_SLEW_DPS))
 }
 
 pub fn run_sim_vehicle(arguments: &SimVehicleArgs, errors: &mut impl Write) -> ExitCode {
@@ -206,6 +266,52 @@ mod tests {
             let said = String::from_utf8(errors).expect("text");
             assert!(said.starts_with("gimbald sim vehicle: --gimbal-output: ardupilot drives a device"), "{said}");
         }
+    }
+
+    fn gremsy(options: &[&str]) -> Result<gremsy::sim::DeviceSettings, String> {
+        let line = ["gimbald", "sim", "gimbal", "--endpoint", "udpin:127.0.0.1:0", "--family", "gremsy"];
+        let Ok(Cli { command: Command::Sim(SimCommand::Gimbal(arguments)), .. }) =
+            Cli::try_parse_from(line.iter().chain(options))
+        else {
+            panic!("it parses")
+        };
+        gremsy_settings_on_link(&arguments).map_err(|error| error.to_string())
+    }
+
+    /// The same for a Gremsy: v2 unless told otherwise.
+    #[test]
+    fn options_make_the_gremsy() {
+        use gremsy::parameters::RcType;
+        use gremsy::sim::DeviceSettings;
+
+        let of = |generation| DeviceSettings { system_id: SystemId::Fixed(1), ..DeviceSettings::of(generation) };
+        let usual = of(Generation::V2);
+        let v1 = ["--gremsy-generation", "v1"];
+        for (options, expected) in [
+            (&[][..], usual.clone()),
+            (&v1, of(Generation::V1)),
+            (
+                &["--gremsy-firmware", "7.8.6"],
+                DeviceSettings { firmware: FirmwareVersion::official(7, 8, 6), ..usual.clone() },
+            ),
+            (&["--gremsy-rc-type", "joystick"], DeviceSettings { rc_type: RcType::Joystick, ..usual.clone() }),
+            (&["--gremsy-rc-type", "15"], DeviceSettings { rc_type: RcType::Other(15), ..usual.clone() }),
+            (&["--gremsy-quiet"], DeviceSettings { has_usual_streams: false, ..usual.clone() }),
+            (&["--gremsy-inverted-pitch"], DeviceSettings { has_inverted_pitch: true, ..usual.clone() }),
+            (&["--gremsy-latched"], DeviceSettings { is_latched_by_retract: true, ..usual.clone() }),
+            (&["--slew", "300"], DeviceSettings { control_speed_dps: 255, ..usual.clone() }),
+        ] {
+            assert_eq!(gremsy(options), Ok(expected), "{options:?}");
+        }
+        let limited = gremsy(&["--yaw-range", "160"]).expect("a gimbal").plant.limits.yaw;
+        assert_eq!(limited, AxisLimits::new(Angle::from_degrees(-160.0), Angle::from_degrees(160.0)));
+
+        let old = ["--gremsy-firmware", "7.5.6"];
+        assert!(gremsy(&[&v1[..], &old].concat()).expect("a gimbal").is_old());
+        assert_eq!(
+            gremsy(&old),
+            Err("--gremsy-firmware 7.5.6: before 7.7.3 there is no v2; add --gremsy-generation v1".to_owned())
+        );
     }
 
     /// "78 configuration, 64 usage": a fault that does not exist is a wrong argument.
