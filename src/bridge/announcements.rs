@@ -49,6 +49,7 @@ enum Kind {
     Refused,
     Misread,
     AcquireWar,
+    Fault(&'static str),
 }
 
 /// One text to be sent.
@@ -77,6 +78,11 @@ impl Announcements {
     /// What is said of `event`. That a gimbal is lost or back is said by [`handle_state`](Self::handle_state).
     pub fn handle_event(&mut self, now: Timestamp, subject: Subject<'_>, event: &Event) -> Option<Announcement> {
         let name = |id| subject.names.of(id);
+        if let Event::Fault { what } = *event {
+            return self
+                .may_say(now, (subject.manager, Kind::Fault(what), None), 0)
+                .then(|| Announcement { severity: severity::WARNING, text: signed(subject.name, what) });
+        }
         let (kind, who, text) = match *event {
             Event::Control(Change { place: Place::Primary, how, who, from: Some(from), to: Some(to) }) => match how {
                 How::Borrowed => (Kind::Borrowed, who, "autopilot borrowed control".to_owned()),

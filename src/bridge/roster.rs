@@ -163,7 +163,7 @@ impl Roster {
         let mut numbers = 1..=voice::LAST_NUMBER;
         for (gimbal, component) in settings.gimbals.iter().zip(wanted) {
             let component = component.expect("the configuration was refused when a manager component is missing");
-            let number = gimbal.family.speaks_through_manager().then(|| {
+            let number = gimbal.family.may_speak_through_manager().then(|| {
                 numbers.next().expect("the configuration was refused when there are more than six such gimbals")
             });
             roster.gimbals.push(Gimbal::new(gimbal.clone(), &settings.control, component, true, number));

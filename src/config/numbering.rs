@@ -5,7 +5,8 @@
 use super::problem::Problem;
 use super::reader::bare;
 use super::schema::Gimbal;
-use crate::gimbals::settings::DeviceYawFrame;
+use crate::gimbals::gremsy::driver::Generation;
+use crate::gimbals::settings::{DeviceYawFrame, Family};
 use crate::manager::voice::LAST_NUMBER;
 
 /// The managers that need no setting: ONBOARD_COMPUTER to ONBOARD_COMPUTER4.
@@ -14,7 +15,9 @@ const AUTOMATIC: [u8; 4] = [191, 192, 193, 194];
 /// Why the manager of a gimbal may not have a component id, as "component … is …".
 fn reserved(id: u8, gimbal: &Gimbal, presents_devices: bool) -> Option<&'static str> {
     // The manager of a gimbal that is no v2 device speaks for the device, too; but not beside one that is presented.
-    let speaks_for_device = speaks_through_manager(gimbal) && !presents_devices;
+    let is_v1 = gimbal.gremsy_generation.as_ref().is_some_and(|known| known.value == Some(Generation::V1));
+    let is_gremsy = gimbal.family.as_ref().is_some_and(|family| family.value == Family::Gremsy);
+    let speaks_for_device = (speaks_through_manager(gimbal) || is_gremsy && is_v1) && !presents_devices;
     match id {
         100..=105 => Some("a camera's"),
         154 | 171..=175 if !speaks_for_device => Some("a gimbal device's"),
@@ -33,7 +36,11 @@ fn speaks_through_manager(gimbal: &Gimbal) -> bool {
     gimbal.family.as_ref().is_some_and(|family| family.value.speaks_through_manager())
 }
 
-/// Gimbals that are no v2 devices have the device ids 1 to 6, and take yaw from the vehicle's nose only.
+fn may_speak_through_manager(gimbal: &Gimbal) -> bool {
+    gimbal.family.as_ref().is_some_and(|family| family.value.may_speak_through_manager())
+}
+
+/// Gimbals that are no v2 devices have the device ids 1 to 6, and v1 gimbals take yaw from the vehicle's nose only.
 fn check_numbers(gimbals: &[Gimbal], problems: &mut Vec<Problem>) {
     for gimbal in gimbals.iter().filter(|gimbal| speaks_through_manager(gimbal)) {
         if let Some(frame) = gimbal.device_yaw_frame.as_ref().filter(|frame| frame.value == DeviceYawFrame::Earth) {
@@ -41,10 +48,10 @@ fn check_numbers(gimbals: &[Gimbal], problems: &mut Vec<Problem>) {
             problems.push(frame.problem(found, "auto or vehicle"));
         }
     }
-    let mut numbered = gimbals.iter().filter(|gimbal| speaks_through_manager(gimbal));
+    let mut numbered = gimbals.iter().filter(|gimbal| may_speak_through_manager(gimbal));
     if let Some(family) = numbered.nth(usize::from(LAST_NUMBER)).and_then(|gimbal| gimbal.family.as_ref()) {
         let found =
-            format!("found {}, the family of gimbals that are no v2 devices, for the seventh time", family.shown);
+            format!("found {}, a family of gimbals that may be no v2 devices, for the seventh time", family.shown);
         problems.push(family.problem(found, "at most 6 gimbals of such families"));
     }
 }

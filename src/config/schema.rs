@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use crate::bridge::settings::{Role, SystemId};
 use crate::endpoint::{Endpoint, EndpointError};
+use crate::gimbals::gremsy::driver::Generation;
 use crate::gimbals::mavlink_v1::config::V1RadioControl;
 use crate::gimbals::settings::{DeviceYawFrame, Family, Takeover};
 use crate::gimbals::signs::Signs;
@@ -16,7 +17,7 @@ use crate::manager::settings::{AltitudeReference, Firewall};
 use super::document::{Raw, Table, Value};
 use super::problem::{Place, Problem};
 use super::reader::{Expected, Located, Section, bare, flag, is_name, number, text, whole, word};
-use super::signs::signs;
+use super::signs::{signs, signs_or_auto};
 use super::suggestion;
 
 const ROLES: &[(&str, Role)] = &[
@@ -29,6 +30,7 @@ const FAMILIES: &[(&str, Family)] = &[
     (Family::Auto.name(), Family::Auto),
     (Family::MavlinkV2.name(), Family::MavlinkV2),
     (Family::MavlinkV1.name(), Family::MavlinkV1),
+    (Family::Gremsy.name(), Family::Gremsy),
 ];
 const TAKEOVERS: &[(&str, Takeover)] = &[
     (Takeover::Open.name(), Takeover::Open),
@@ -43,6 +45,8 @@ const V1_RADIO_CONTROLS: &[(&str, V1RadioControl)] = &[
     (V1RadioControl::Silence.name(), V1RadioControl::Silence),
     (V1RadioControl::Mode.name(), V1RadioControl::Mode),
 ];
+const GENERATIONS: &[(&str, Option<Generation>)] =
+    &[("auto", None), (Generation::V1.name(), Some(Generation::V1)), (Generation::V2.name(), Some(Generation::V2))];
 const UNCLAIMED: &[(&str, bool)] = &[("open", true), ("closed", false)];
 const FIREWALLS: &[(&str, Firewall)] = &[("on", Firewall::On), ("warn", Firewall::Warn)];
 const SYNTHESIS: &[(&str, bool)] = &[("auto", true), ("off", false)];
@@ -97,6 +101,11 @@ pub(super) struct Gimbal {
     pub v1_report_sign: Option<Located<Signs>>,
     pub v1_configure: Option<Located<bool>>,
     pub v1_radio_control: Option<Located<V1RadioControl>>,
+    pub gremsy_report_sign: Option<Located<Option<Signs>>>,
+    pub gremsy_generation: Option<Located<Option<Generation>>>,
+    pub retract_allowed: Option<Located<bool>>,
+    pub stow_pitch_deg: Option<Located<f64>>,
+    pub stow_yaw_deg: Option<Located<f64>>,
     pub manual_pitch_rate_dps: Option<Located<f64>>,
     pub manual_yaw_rate_dps: Option<Located<f64>>,
 }
@@ -161,6 +170,11 @@ fn gimbal(section: &mut Section<'_>, place: Place) -> Gimbal {
         v1_report_sign: section.read("v1_report_sign", signs),
         v1_configure: section.read("v1_configure", flag),
         v1_radio_control: section.read("v1_radio_control", |raw| word(raw, V1_RADIO_CONTROLS)),
+        gremsy_report_sign: section.read("gremsy_report_sign", signs_or_auto),
+        gremsy_generation: section.read("gremsy_generation", |raw| word(raw, GENERATIONS)),
+        retract_allowed: section.read("retract_allowed", flag),
+        stow_pitch_deg: section.read("stow_pitch_deg", stow_pitch),
+        stow_yaw_deg: section.read("stow_yaw_deg", stow_yaw),
         manual_pitch_rate_dps: section.read("manual_pitch_rate_dps", manual_rate),
         manual_yaw_rate_dps: section.read("manual_yaw_rate_dps", manual_rate),
     }
@@ -349,6 +363,14 @@ fn timeout_or_never(raw: &Raw) -> Result<Duration, Expected> {
 
 fn manual_rate(raw: &Raw) -> Result<f64, Expected> {
     number(raw, &(0.1..=720.0)).ok_or_else(|| Expected::new("a number of degrees per second from 0.1 to 720"))
+}
+
+fn stow_pitch(raw: &Raw) -> Result<f64, Expected> {
+    number(raw, &(-90.0..=90.0)).ok_or_else(|| Expected::new("a number of degrees from -90 to 90"))
+}
+
+fn stow_yaw(raw: &Raw) -> Result<f64, Expected> {
+    number(raw, &(-180.0..=180.0)).ok_or_else(|| Expected::new("a number of degrees from -180 to 180"))
 }
 
 fn listen(raw: &Raw) -> Result<SocketAddr, Expected> {

@@ -6,6 +6,8 @@ use std::path::PathBuf;
 
 use crate::bridge::settings::{LinkSettings, Role, Settings, Transport};
 use crate::endpoint::Endpoint;
+use crate::geometry::Angle;
+use crate::gimbals::gremsy::config::GremsySettings;
 use crate::gimbals::mavlink_v1::config::V1Settings;
 use crate::gimbals::settings::GimbalSettings;
 use crate::manager::settings::ControlSettings;
@@ -70,6 +72,10 @@ fn value_or<T>(located: Option<Located<T>>, default: T) -> T {
     located.map_or(default, |located| located.value)
 }
 
+fn degrees(located: Located<f64>) -> Angle {
+    Angle::from_degrees(located.value)
+}
+
 fn required<T>(located: Option<Located<T>>) -> T {
     located.expect("a missing required key is a problem, and settings are built when there is none").value
 }
@@ -110,6 +116,13 @@ fn gimbal(gimbal: Gimbal, links: &[LinkSettings]) -> GimbalSettings {
             report_sign: value_or(gimbal.v1_report_sign, default.v1.report_sign),
             configures: value_or(gimbal.v1_configure, default.v1.configures),
             radio_control: value_or(gimbal.v1_radio_control, default.v1.radio_control),
+        },
+        gremsy: GremsySettings {
+            generation: value_or(gimbal.gremsy_generation, default.gremsy.generation),
+            retract_allowed: value_or(gimbal.retract_allowed, default.gremsy.retract_allowed),
+            stow_pitch: gimbal.stow_pitch_deg.map_or(default.gremsy.stow_pitch, degrees),
+            stow_yaw: gimbal.stow_yaw_deg.map_or(default.gremsy.stow_yaw, degrees),
+            report_sign: gimbal.gremsy_report_sign.and_then(|sign| sign.value),
         },
         manual_pitch_rate_dps: value_or(gimbal.manual_pitch_rate_dps, default.manual_pitch_rate_dps),
         manual_yaw_rate_dps: value_or(gimbal.manual_yaw_rate_dps, default.manual_yaw_rate_dps),

@@ -3,7 +3,7 @@
 use crate::gimbals::signs::{Sign, Signs};
 
 use super::document::{Raw, Table};
-use super::reader::{Expected, number, word};
+use super::reader::{Expected, number, text, word};
 
 const WORDS: &[(&str, Signs)] = &[("normal", Signs::NORMAL), ("reversed", Signs::REVERSED)];
 
@@ -14,6 +14,14 @@ pub(super) fn signs(raw: &Raw) -> Result<Signs, Expected> {
         raw => word(raw, WORDS)
             .map_err(|Expected(words)| Expected(format!("{words}, or a table such as {{ pitch = -1, yaw = -1 }}"))),
     }
+}
+
+/// The same, or `None` for a gimbal of which it is found out.
+pub(super) fn signs_or_auto(raw: &Raw) -> Result<Option<Signs>, Expected> {
+    if text(raw) == Some("auto") {
+        return Ok(None);
+    }
+    signs(raw).map(Some).map_err(|Expected(signs)| Expected(format!("auto, {signs}")))
 }
 
 fn axes(table: &Table) -> Result<Signs, Expected> {

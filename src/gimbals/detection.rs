@@ -2,7 +2,7 @@
 //!
 //! Every gimbal is taken for a v2 device at first, and asked who it is for ever, as the Gimbal Protocol v2 has it. One that
 //! gives no sign of being one is taken for a v1 gimbal: soon when it tells where it looks by a message of v1, late when it
-//! sends nothing but heartbeats. Nothing of this moves it. Whenever a sign of v2 comes after all, it is a v2 device again.
+//! sends nothing but heartbeats. One that says that Gremsy made it is driven as a Gremsy. Nothing of this moves it. Whenever a sign of v2 comes after all, it is a v2 device again.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -10,6 +10,7 @@ use std::time::Duration;
 use super::details::GimbalDetails;
 use super::driver::{CommandOutcome, DriverOutput, GimbalDriver};
 use super::families;
+use super::gremsy;
 use super::mavlink_v2::{MavlinkV2Driver, packet};
 use super::operation::{Operation, OperationId};
 use super::report::Report;
@@ -85,7 +86,10 @@ impl Detection {
         tracing::info!(%device, family = family.name(), "the gimbal's family is known");
         self.timers.cancel(Timer::JudgeByAttitude);
         self.timers.cancel(Timer::JudgeBySilence);
-        self.outputs.push_back(DriverOutput::Report(Report::SpeaksForItself(family == Family::MavlinkV2)));
+        // Which of its protocols a Gremsy speaks is for its driver to find out.
+        if family != Family::Gremsy {
+            self.outputs.push_back(DriverOutput::Report(Report::SpeaksForItself(family == Family::MavlinkV2)));
+        }
         if family == Family::MavlinkV2 {
             // What it told meanwhile went nowhere.
             self.v2 = MavlinkV2Driver::new();
@@ -105,6 +109,12 @@ impl Detection {
                 self.timers.set(Timer::JudgeByAttitude, now + V1_BY_ITS_ATTITUDE_AFTER);
                 self.timers.set(Timer::JudgeBySilence, now + V1_BY_ITS_SILENCE_AFTER);
             }
+            message::GIMBAL_DEVICE_INFORMATION if is_of_gremsy(frame) => {
+                self.evidence.v2 = true;
+                self.take(now, Family::Gremsy);
+            }
+            message::GIMBAL_DEVICE_INFORMATION | message::GIMBAL_DEVICE_ATTITUDE_STATUS
+                if self.family() == Family::Gremsy => {}
             message::GIMBAL_DEVICE_INFORMATION | message::GIMBAL_DEVICE_ATTITUDE_STATUS
                 if (!self.evidence.v2 || self.other.is_some()) && is_of_v2(frame) =>
             {
@@ -222,6 +232,12 @@ impl GimbalDriver for Detection {
     fn details(&self, now: Timestamp) -> GimbalDetails {
         self.other.as_ref().map_or_else(|| self.v2.details(now), |other| other.details(now))
     }
+}
+
+/// Whether a gimbal says that it is made by Gremsy, which has commands and modes of its own.
+fn is_of_gremsy(frame: &Frame<'_>) -> bool {
+    packet::read_information(frame)
+        .is_some_and(|information| information.gimbal_device_id == 0 && gremsy::is_vendor(&information.identity.vendor))
 }
 
 /// Whether only a v2 device says that of itself.

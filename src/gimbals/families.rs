@@ -2,6 +2,7 @@
 
 use super::detection::Detection;
 use super::driver::GimbalDriver;
+use super::gremsy::GremsyDriver;
 use super::mavlink_v1::MavlinkV1Driver;
 use super::mavlink_v2::MavlinkV2Driver;
 use super::settings::{Family, GimbalSettings};
@@ -12,5 +13,6 @@ pub fn driver(family: Family, settings: &GimbalSettings) -> Box<dyn GimbalDriver
         Family::Auto => Box::new(Detection::new(settings.clone())),
         Family::MavlinkV2 => Box::new(MavlinkV2Driver::new()),
         Family::MavlinkV1 => Box::new(MavlinkV1Driver::new(settings.v1)),
+        Family::Gremsy => Box::new(GremsyDriver::new(settings.gremsy)),
     }
 }

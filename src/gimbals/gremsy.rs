@@ -3,6 +3,8 @@
 //!
 //! Facts are those of the vendor's gSDK (2020 to 2026) and its guide; what no published source settles says so.
 
+pub mod config;
+pub mod driver;
 pub mod modes;
 pub mod packet;
 pub mod parameters;
@@ -10,6 +12,8 @@ pub mod readings;
 pub mod sim;
 pub mod status;
 pub mod version;
+
+pub use driver::GremsyDriver;
 
 /// Whether `GIMBAL_DEVICE_INFORMATION` with that vendor is a Gremsy's.
 pub fn is_vendor(vendor: &str) -> bool {

@@ -43,15 +43,12 @@ const MAX_NAMES: usize = 512;
 /// So many wait for a refresh at most.
 const MAX_WAITING: usize = 8;
 
-/// `param_id` of a `PARAM_VALUE` that has none.
-const NO_INDEX: u16 = u16::MAX;
-
 /// A parameter that a device should have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Known {
     pub name: &'static str,
-    /// Where the vendor's tables have it; what the gimbal itself tells wins.
-    pub index: u16,
+    /// Its place in the vendor's tables, where that is known.
+    pub index: Option<u16>,
 }
 
 /// Which parameters a device should have, given those that it was heard to have.
@@ -93,7 +90,6 @@ pub struct Parameters {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Value {
     value: f64,
-    index: u16,
     /// `MAV_PARAM_TYPE`.
     kind: u8,
 }
@@ -214,7 +210,7 @@ impl Parameters {
         if self.tries.get(name).is_some_and(|tries| *tries <= TRIES_BY_NAME) {
             self.answers_to_names = true;
         }
-        let entry = Value { value, index: message.param_index, kind: message.param_type };
+        let entry = Value { value, kind: message.param_type };
         self.values.insert(name.to_owned(), entry);
         match &mut self.phase {
             Phase::Listing { since, any, .. } => {
@@ -368,7 +364,7 @@ impl Parameters {
     /// An index beside a name is what some gimbals go by, so it is −1 as long as the name is meant.
     fn send_read(&mut self, known: Known, by_index: bool) {
         let Some(MavId { system, component }) = self.device else { return };
-        let index = if by_index && known.index != NO_INDEX { i16::try_from(known.index).unwrap_or(-1) } else { -1 };
+        let index = known.index.filter(|_| by_index).and_then(|index| i16::try_from(index).ok()).unwrap_or(-1);
         self.send(MavMessage::PARAM_REQUEST_READ(PARAM_REQUEST_READ_DATA {
             param_index: index,
             target_system: system,

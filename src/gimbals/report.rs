@@ -20,6 +20,8 @@ pub enum Report {
     /// Enough is known of the device to steer it, or something of that has changed.
     Known(Identity, Capabilities),
     Attitude(GimbalStatus),
+    /// Something is wrong with it that the pilot ought to know, in a few words; each is told once.
+    Fault(&'static str),
     /// It said where it looks in a way that cannot be believed.
     Malformed {
         /// A word for the counters and the person looking.

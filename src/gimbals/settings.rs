@@ -1,5 +1,6 @@
 //! What the user may say of one gimbal.
 
+use super::gremsy::config::GremsySettings;
 use super::mavlink_v1::config::V1Settings;
 
 /// A `[[gimbal]]` entry.
@@ -18,6 +19,8 @@ pub struct GimbalSettings {
     pub device_yaw_frame: DeviceYawFrame,
     /// Of a v1 gimbal.
     pub v1: V1Settings,
+    /// Of a Gremsy.
+    pub gremsy: GremsySettings,
     /// Full deflection of manual control (288), degrees per second.
     pub manual_pitch_rate_dps: f64,
     pub manual_yaw_rate_dps: f64,
@@ -36,6 +39,7 @@ impl GimbalSettings {
             setpoint_rate_hz: 20,
             device_yaw_frame: DeviceYawFrame::Auto,
             v1: V1Settings::default(),
+            gremsy: GremsySettings::default(),
             manual_pitch_rate_dps: 30.0,
             manual_yaw_rate_dps: 30.0,
         }
@@ -48,13 +52,22 @@ pub enum Family {
     Auto,
     MavlinkV2,
     MavlinkV1,
+    Gremsy,
 }
 
 impl Family {
+    /// Whether its gimbals may be no v2 devices, so that a device id is kept for each.
+    pub const fn may_speak_through_manager(self) -> bool {
+        match self {
+            Self::Auto | Self::MavlinkV2 => false,
+            Self::MavlinkV1 | Self::Gremsy => true,
+        }
+    }
+
     /// Whether its gimbals are no v2 devices, so that their manager sends 283 and 285 for them.
     pub const fn speaks_through_manager(self) -> bool {
         match self {
-            Self::Auto | Self::MavlinkV2 => false,
+            Self::Auto | Self::MavlinkV2 | Self::Gremsy => false,
             Self::MavlinkV1 => true,
         }
     }
@@ -64,6 +77,7 @@ impl Family {
             Self::Auto => "auto",
             Self::MavlinkV2 => "mavlink_v2",
             Self::MavlinkV1 => "mavlink_v1",
+            Self::Gremsy => "gremsy",
         }
     }
 }

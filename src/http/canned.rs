@@ -121,6 +121,7 @@ fn held_gimbal() -> GimbalSnapshot {
             generation: Some("v2".into()),
             faults: vec!["firmware 7.8.7 reports a wrong yaw from North".into()],
             parameters: BTreeMap::from([("RC_TYPE".into(), 7.0)]),
+            ..GimbalDetails::default()
         },
     }
 }

@@ -28,6 +28,17 @@ fn status_is_the_whole_snapshot() {
     let answer = window.get("/api/v1/status");
 
     assert_eq!((answer.status, answer.header("content-type")), (200, Some("application/json")));
+    let nothing = json!({
+        "generation": null, "faults": [], "parameters": {}, "stage": null, "version": null, "mode": null,
+        "operation": null, "not_aligned": [], "motors_on": null, "battery_v": null, "load_percent": null, "imu": null,
+        "encoders": null, "axes": {}, "gyro_filter": null, "output_filter": null, "gain": null, "radio_type": null,
+        "encoder_unit": null, "combined_attitude": null, "home_on_mode_change": null, "streams": {},
+        "message_ages_ms": {},
+    });
+    let mut of_the_family = nothing.clone();
+    of_the_family["generation"] = "v2".into();
+    of_the_family["faults"] = json!(["firmware 7.8.7 reports a wrong yaw from North"]);
+    of_the_family["parameters"] = json!({"RC_TYPE": 7.0});
     let expected = json!({
         "version": "0.1.0",
         "uptime_s": 3725.5,
@@ -70,10 +81,7 @@ fn status_is_the_whole_snapshot() {
                 "flags": ["yaw_lock", "roll_lock"], "failure_flags": ["motor_error"],
                 "rejected": {"1/100": {"not_in_control": 12}},
                 "presented": {"device": "1/154", "stream": "steady", "asked_age_ms": 12_000},
-                "details": {
-                    "generation": "v2", "faults": ["firmware 7.8.7 reports a wrong yaw from North"],
-                    "parameters": {"RC_TYPE": 7.0},
-                },
+                "details": of_the_family,
             },
             {
                 "name": "lamp", "configured": true, "family": "auto", "manager_component_id": 192, "device_id": null,
@@ -84,7 +92,7 @@ fn status_is_the_whole_snapshot() {
                 "setpoint": null, "primary": null, "secondary": null, "primary_age_ms": null, "secondary_age_ms": null,
                 "lender": null, "takeover": "open", "roi": null,
                 "flags": [], "failure_flags": [], "rejected": {}, "presented": null,
-                "details": {"generation": null, "faults": [], "parameters": {}},
+                "details": nothing,
             },
         ],
         "conflicts": ["1/191 is also used by 10.0.0.7: set its component id to another value"],

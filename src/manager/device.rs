@@ -15,7 +15,7 @@ use crate::wire::ids::{CommandResult, FailureFlags};
 impl GimbalManager {
     /// News from the driver.
     pub fn handle_report(&mut self, now: Timestamp, report: Report, around: Surroundings<'_>) {
-        if !matches!(report, Report::Attitude(_) | Report::Malformed { .. }) {
+        if !matches!(report, Report::Attitude(_) | Report::Malformed { .. } | Report::Fault(_)) {
             self.last_command = None;
         }
         if matches!(report, Report::Restarted | Report::Lost) {
@@ -75,6 +75,7 @@ impl GimbalManager {
                     self.tracking.handle_turned(now, &situation);
                 }
             }
+            Report::Fault(what) => self.tell(Event::Fault { what }),
             Report::Malformed { reason } => {
                 if let Some(device) = self.device {
                     self.count_refusal(device, reason);

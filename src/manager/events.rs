@@ -39,6 +39,10 @@ pub enum Event {
     Restarted {
         device: Option<MavId>,
     },
+    /// Something is wrong with the gimbal, in a few words.
+    Fault {
+        what: &'static str,
+    },
     /// Something else than where it looks was asked of the gimbal, and given on to it.
     Operated {
         who: MavId,
@@ -116,6 +120,7 @@ impl Event {
             Self::Back { .. } => "gimbal_back",
             Self::Lost { .. } => "gimbal_lost",
             Self::Restarted { .. } => "gimbal_restarted",
+            Self::Fault { .. } => "fault",
             Self::Operated { .. } => "operated",
             Self::RatesEnded { .. } => "rates_ended",
             Self::RoiStarted { .. } => "roi_started",
@@ -135,6 +140,7 @@ impl Event {
             Self::Found { device } | Self::Back { device } => Some(device),
             Self::Lost { device } | Self::Restarted { device } => device,
             Self::RoiStarted { who } | Self::RoiEnded { who } => who,
+            Self::Fault { .. } => None,
         }
     }
 
@@ -168,6 +174,7 @@ impl Event {
     pub const fn reason(&self) -> Option<&'static str> {
         match *self {
             Self::Refused { reason, .. } => Some(reason),
+            Self::Fault { what } => Some(what),
             Self::Operated { operation, .. } => Some(operation),
             Self::Doubtful { doubt, .. } => Some(doubt.name()),
             Self::RatesEnded { end: RatesEnd::TimedOut, .. } => Some("timed_out"),
@@ -196,6 +203,7 @@ impl Event {
             Self::Back { device } => format!("gimbal {device} is back"),
             Self::Lost { .. } => "gimbal lost".to_owned(),
             Self::Restarted { .. } => "gimbal restarted; it holds still until somebody asks".to_owned(),
+            Self::Fault { what } => format!("fault: {what}"),
             Self::Operated { who, operation } => format!("{} asked for {}", names.of(who), operation.replace('_', " ")),
             Self::RatesEnded { who, end: RatesEnd::TimedOut } => {
                 format!("rotation stopped: {} did not ask for it again", names.of(who))

@@ -12,6 +12,9 @@ use nix::unistd::mkfifo;
 use gimbald::bridge::settings::{LinkSettings, Role, Settings, SystemId, Transport};
 use gimbald::config::settings::{DaemonSettings, Directories, HttpSettings};
 use gimbald::config::{self, problem::Problems};
+use gimbald::geometry::Angle;
+use gimbald::gimbals::gremsy::config::GremsySettings;
+use gimbald::gimbals::gremsy::driver::Generation;
 use gimbald::gimbals::mavlink_v1::config::{V1RadioControl, V1Settings};
 use gimbald::gimbals::settings::{DeviceYawFrame, Family, GimbalSettings, Takeover};
 use gimbald::gimbals::signs::{Sign, Signs};
@@ -89,7 +92,7 @@ lease_timeout_s = -1
         "c.toml:16: link.Gimbal.endpoint: missing; expected an endpoint, for example udpin:0.0.0.0:14550",
         r#"c.toml:17: link.Gimbal.name: found "Gimbal", the name in line 5; expected a name that differs from all others in more than case and - or _"#,
         r#"c.toml:21: gimbal.camera.link: found "gimbl"; expected the name of a link, one of gimbal, ground, Gimbal; did you mean gimbal?"#,
-        r#"c.toml:22: gimbal.camera.family: found "mavlink_v3"; expected auto, mavlink_v2 or mavlink_v1; did you mean mavlink_v2?"#,
+        r#"c.toml:22: gimbal.camera.family: found "mavlink_v3"; expected auto, mavlink_v2, mavlink_v1 or gremsy; did you mean mavlink_v2?"#,
         "c.toml:24: htp: unknown key; expected one of vehicle, link, gimbal, autopilot, control, roi, http; did you mean http?",
         "c.toml:27: control.lease_timeout_s: found -1; expected a number of seconds from 0.001 to 3600",
     ];
@@ -249,7 +252,15 @@ fn numbers_have_ranges_and_kinds() {
         ("v1_report_sign = -1", "found -1; expected normal or reversed, or a table such as { pitch = -1, yaw = -1 }"),
         ("v1_configure = \"px4\"", "found \"px4\"; expected true or false"),
         ("v1_radio_control = \"mod\"", "found \"mod\"; expected none, silence or mode; did you mean mode?"),
-        ("family = \"gremsy\"", "found \"gremsy\"; expected auto, mavlink_v2 or mavlink_v1"),
+        ("family = \"siyi\"", "found \"siyi\"; expected auto, mavlink_v2, mavlink_v1 or gremsy"),
+        (
+            "gremsy_report_sign = \"up\"",
+            "found \"up\"; expected auto, normal or reversed, or a table such as { pitch = -1, yaw = -1 }",
+        ),
+        ("gremsy_generation = \"v3\"", "found \"v3\"; expected auto, v1 or v2; did you mean v1?"),
+        ("retract_allowed = 1", "found 1; expected true or false"),
+        ("stow_pitch_deg = 91", "found 91; expected a number of degrees from -90 to 90"),
+        ("stow_yaw_deg = -181", "found -181; expected a number of degrees from -180 to 180"),
         ("link = 1", "found 1; expected the name of a link as text"),
     ] {
         let (key, _) = line.split_once(' ').expect("key and value");
@@ -335,7 +346,7 @@ fn gimbals_that_are_no_v2_devices_have_numbers() {
     assert_eq!(check(&format!("{LINK}{}", entries(6)), &[]).code, Some(0));
     assert_refused(
         &entries(7),
-        &["c.toml:31: gimbal.g6.family: found \"mavlink_v1\", the family of gimbals that are no v2 devices, for the \
+        &["c.toml:31: gimbal.g6.family: found \"mavlink_v1\", a family of gimbals that may be no v2 devices, for the \
              seventh time; expected at most 6 gimbals of such families"],
     );
     let v1 = |lines: &str| format!("[[gimbal]]\nname = \"a\"\nfamily = \"mavlink_v1\"\n{lines}");
@@ -638,6 +649,11 @@ v1_sign = { pitch = -1, roll = 1.0, yaw = -1 }
 v1_report_sign = "reversed"
 v1_configure = true
 v1_radio_control = "mode"
+gremsy_generation = "v1"
+gremsy_report_sign = "reversed"
+retract_allowed = true
+stow_pitch_deg = -45
+stow_yaw_deg = 90
 manual_pitch_rate_dps = 12.5
 manual_yaw_rate_dps = 45
 [vehicle]
@@ -705,6 +721,13 @@ fn every_key_arrives_where_it_belongs() {
                     report_sign: Signs::REVERSED,
                     configures: true,
                     radio_control: V1RadioControl::Mode,
+                },
+                gremsy: GremsySettings {
+                    generation: Some(Generation::V1),
+                    retract_allowed: true,
+                    stow_pitch: Angle::from_degrees(-45.0),
+                    stow_yaw: Angle::from_degrees(90.0),
+                    report_sign: Some(Signs::REVERSED),
                 },
                 manual_pitch_rate_dps: 12.5,
                 manual_yaw_rate_dps: 45.0,
@@ -810,6 +833,11 @@ fn variables_override_the_file() {
         ("GIMBALD__GIMBAL__NOSE_CAM__V1_REPORT_SIGN", "reversed"),
         ("GIMBALD__GIMBAL__NOSE_CAM__V1_CONFIGURE", "true"),
         ("GIMBALD__GIMBAL__NOSE_CAM__V1_RADIO_CONTROL", "mode"),
+        ("GIMBALD__GIMBAL__NOSE_CAM__GREMSY_GENERATION", "v1"),
+        ("GIMBALD__GIMBAL__NOSE_CAM__GREMSY_REPORT_SIGN", "reversed"),
+        ("GIMBALD__GIMBAL__NOSE_CAM__RETRACT_ALLOWED", "true"),
+        ("GIMBALD__GIMBAL__NOSE_CAM__STOW_PITCH_DEG", "-45"),
+        ("GIMBALD__GIMBAL__NOSE_CAM__STOW_YAW_DEG", "90"),
         ("GIMBALD__GIMBAL__NOSE_CAM__MANUAL_PITCH_RATE_DPS", "12.5"),
         ("GIMBALD__GIMBAL__NOSE_CAM__MANUAL_YAW_RATE_DPS", "45"),
         ("GIMBALD__VEHICLE__SYSTEM_ID", "7"),

@@ -11,7 +11,7 @@ const ID: OperationId = OperationId(7);
 const NAMES: [&str; 3] = ["ALPHA", "BETA", "GAMMA"];
 
 fn catalogue(_has: &dyn Fn(&str) -> bool) -> Vec<Known> {
-    NAMES.iter().zip(0..).map(|(name, index)| Known { name, index }).collect()
+    NAMES.iter().zip(0..).map(|(name, index)| Known { name, index: Some(index) }).collect()
 }
 
 /// The machine and a gimbal on a line, in simulated time.

@@ -1,0 +1,239 @@
+//! From a setpoint to what is sent, in either generation.
+
+use super::effect::Pose;
+use super::faults::Fault;
+use super::mode_change::{self, ModeChange};
+use super::mount::{Condition, MountOutput, Order};
+use super::{Generation, GremsyDriver};
+use crate::geometry::{Angle, AngularRate, GimbalAngles, Yaw, YawFrame};
+use crate::gimbals::driver::{DriverOutput, GimbalDriver};
+use crate::gimbals::gremsy::modes::{self, ControlMode};
+use crate::gimbals::gremsy::packet;
+use crate::gimbals::operation::{OperationError, YawMode};
+use crate::gimbals::setpoint::{Pointing, RadioControl, Setpoint, Stabilised, Turning};
+use crate::timestamp::Timestamp;
+use crate::wire::MavId;
+use crate::wire::dialect::{COMMAND_LONG_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA, MavMessage};
+use crate::wire::ids::GimbalFlags;
+
+/// Closer to where it was told to look it is there.
+const THERE: Angle = Angle::from_degrees(1.0);
+
+impl GremsyDriver {
+    /// What somebody who may wants of it.
+    pub(super) fn steer(&mut self, now: Timestamp, setpoint: Setpoint) {
+        let Some(device) = self.device else { return };
+        let is_stop = matches!(setpoint, Setpoint::Turn(turning) if turning.is_zero());
+        let setpoint = self.within_policy(setpoint);
+        // One that is not heard may still hear that it is to stop.
+        if !self.is_alive && !is_stop {
+            return;
+        }
+        self.effect.handle_target(pose_of(setpoint).filter(|_| self.is_present));
+        match self.search.decided() {
+            Some(Generation::V1) => {
+                self.mount.order(now, order_of(setpoint));
+                self.mount.advance(now, device, self.condition());
+            }
+            Some(Generation::V2) => self.steer_v2(now, device, setpoint, is_stop),
+            None => {}
+        }
+        let is_off = self.heard.status.is_some_and(|(_, status)| !status.motors_on());
+        if self.is_present && is_off && !self.is_retracted && !is_stop && !matches!(setpoint, Setpoint::Retract) {
+            self.raise(Fault::MotorsOff);
+        }
+    }
+
+    /// "RETRACT in v2 cuts motors; on some firmware only a reboot re-enables": unless it is allowed, it is turned to where
+    /// it is stowed.
+    fn within_policy(&self, setpoint: Setpoint) -> Setpoint {
+        match setpoint {
+            Setpoint::Retract if !self.settings.retract_allowed => Setpoint::Point(Pointing {
+                roll: Angle::ZERO,
+                pitch: self.settings.stow_pitch,
+                yaw: Yaw::InVehicleFrame(self.settings.stow_yaw),
+                stabilised: Stabilised::BOTH,
+                radio_control: RadioControl::Off,
+            }),
+            setpoint => setpoint,
+        }
+    }
+
+    /// Says a setpoint of the driver's own.
+    pub(super) fn send_setpoint(&mut self, now: Timestamp, setpoint: Setpoint) {
+        self.effect.handle_target(pose_of(setpoint).filter(|_| self.is_present));
+        self.v2.handle_setpoint(now, setpoint);
+        if let Some(device) = self.device {
+            self.drain_v2(now, device);
+        }
+    }
+
+    fn steer_v2(&mut self, now: Timestamp, device: MavId, setpoint: Setpoint, is_stop: bool) {
+        if !is_stop && (!self.is_present || self.is_booting) {
+            return;
+        }
+        if let Setpoint::Point(Pointing { radio_control: RadioControl::Exclusive, .. }) = setpoint {
+            if !self.is_handed_over {
+                self.is_handed_over = true;
+                self.outputs.push_back(DriverOutput::Command(Box::new(packet::hand_to_rc(device))));
+            }
+            return;
+        }
+        self.is_handed_over = false;
+        match self.mode_change {
+            // It is to move, and its motors are being switched on for that.
+            Some(change) if change.asker().is_none() && !is_stop => return,
+            Some(change) if !is_stop => {
+                self.mode_change = None;
+                if let Some(id) = change.asker() {
+                    let text = "another demand took its place".to_owned();
+                    self.operated(id, Err(OperationError::NoEffect(text)));
+                }
+            }
+            _ => {}
+        }
+        if setpoint == Setpoint::Retract {
+            self.is_retracted = true;
+        } else if self.is_retracted && !is_stop {
+            self.is_retracted = false;
+            let shows_it = self.heard.attitude.is_some_and(|(_, status)| status.flags.contains(GimbalFlags::RETRACT));
+            if shows_it {
+                self.mode_change = Some(ModeChange::new(now, ControlMode::Reset, None));
+                return;
+            }
+        }
+        self.v2.handle_setpoint(now, setpoint);
+    }
+
+    /// A setpoint as the driver for v2 devices makes it: roll and pitch are always level here, rates are all numbers, and
+    /// firmware that does not know the bits of the yaw frame does not get them.
+    pub(super) fn send_v2_setpoint(&mut self, mut setpoint: GIMBAL_DEVICE_SET_ATTITUDE_DATA) {
+        if self.search.decided() != Some(Generation::V2) {
+            return;
+        }
+        let mut flags = GimbalFlags::from_bits_retain(setpoint.flags);
+        flags |= GimbalFlags::ROLL_LOCK | GimbalFlags::PITCH_LOCK;
+        if !self.tells_yaw_frame() {
+            flags.remove(GimbalFlags::YAW_IN_VEHICLE_FRAME | GimbalFlags::YAW_IN_EARTH_FRAME);
+        }
+        setpoint.flags = flags.bits();
+        let turns = setpoint.angular_velocity_y.is_finite() || setpoint.angular_velocity_z.is_finite();
+        if turns && setpoint.angular_velocity_x.is_nan() {
+            setpoint.angular_velocity_x = 0.0;
+        }
+        self.outputs.push_back(DriverOutput::Message(Box::new(MavMessage::GIMBAL_DEVICE_SET_ATTITUDE(setpoint))));
+    }
+
+    fn send_mode(&mut self, device: MavId, mode: ControlMode) {
+        let frame = if mode == ControlMode::Lock { YawFrame::Earth } else { YawFrame::Vehicle };
+        let setpoint = modes::set_mode(device, mode, Some(frame).filter(|_| self.tells_yaw_frame()));
+        self.outputs.push_back(DriverOutput::Message(Box::new(MavMessage::GIMBAL_DEVICE_SET_ATTITUDE(setpoint))));
+    }
+
+    fn tells_yaw_frame(&self) -> bool {
+        self.version().is_some_and(|version| version.tells_yaw_frame())
+    }
+
+    pub(super) fn handle_mode_step(&mut self, now: Timestamp, device: MavId, step: Option<mode_change::Step>) {
+        match step {
+            None => {}
+            Some(mode_change::Step::Send(mode)) => self.send_mode(device, mode),
+            Some(mode_change::Step::Done(asker, result)) => {
+                self.mode_change = None;
+                match asker {
+                    Some(id) => self.operated(id, result),
+                    None if result.is_err() => self.raise(Fault::StaysRetracted),
+                    None => {}
+                }
+                self.mount.forget_mode();
+                let _ = now;
+            }
+        }
+    }
+
+    /// Something else than its setpoint was asked of it.
+    pub(super) fn drop_demand(&mut self, now: Timestamp, device: MavId) {
+        self.effect.handle_target(None);
+        self.mount.drop_order(now, device);
+        self.drain_mount(now);
+        if let Some(change) = self.mode_change.take()
+            && let Some(id) = change.asker()
+        {
+            self.operated(id, Err(OperationError::NoEffect("another demand took its place".to_owned())));
+        }
+    }
+
+    pub(super) fn steer_on(&mut self, now: Timestamp, device: MavId) {
+        if let Some(change) = &mut self.mode_change {
+            let step = change.handle_timeout(now);
+            self.handle_mode_step(now, device, step);
+        }
+        if self.search.decided() == Some(Generation::V1) {
+            self.mount.advance(now, device, self.condition());
+        }
+        self.drain_mount(now);
+    }
+
+    fn drain_mount(&mut self, _now: Timestamp) {
+        while let Some(output) = self.mount.poll_output() {
+            match output {
+                MountOutput::Send(command) => self.send_command(command),
+                MountOutput::Command(command) => self.outputs.push_back(DriverOutput::Command(Box::new(command))),
+                MountOutput::ModeRefused => self.raise(Fault::ModeRefused),
+                MountOutput::ModeTaken => self.faults.clear(|fault| *fault == Fault::ModeRefused),
+                MountOutput::StaysRetracted => self.raise(Fault::StaysRetracted),
+            }
+        }
+    }
+
+    fn send_command(&mut self, command: COMMAND_LONG_DATA) {
+        self.outputs.push_back(DriverOutput::Message(Box::new(MavMessage::COMMAND_LONG(command))));
+    }
+
+    pub(super) fn condition(&self) -> Condition {
+        Condition {
+            is_ready: self.is_alive && self.is_present && self.is_active && !self.is_booting,
+            is_there: self.is_there(),
+            motors_on: self.heard.status.is_some_and(|(_, status)| status.motors_on()),
+        }
+    }
+
+    fn is_there(&self) -> bool {
+        let (Some(Order::Point { angles, mode }), Some((_, status))) = (self.mount.wanted(), self.heard.attitude)
+        else {
+            return false;
+        };
+        let (seen, yaw) = (status.attitude.angles(), status.attitude.yaw());
+        let frame = match mode {
+            YawMode::Follow => YawFrame::Vehicle,
+            YawMode::Lock => YawFrame::Earth,
+        };
+        let close = |a: Angle, b: Angle| (a - b).wrapped().abs() < THERE;
+        close(seen.pitch, angles.pitch) && yaw.frame() == frame && close(yaw.angle(), angles.yaw)
+    }
+}
+
+fn order_of(setpoint: Setpoint) -> Order {
+    let mode = |frame| match frame {
+        YawFrame::Vehicle => YawMode::Follow,
+        YawFrame::Earth => YawMode::Lock,
+    };
+    match setpoint {
+        Setpoint::Retract => Order::Retract,
+        Setpoint::Neutral => Order::Home,
+        Setpoint::Point(Pointing { radio_control: RadioControl::Exclusive, .. }) => Order::RadioControl,
+        Setpoint::Point(Pointing { roll, pitch, yaw, .. }) => {
+            Order::Point { angles: GimbalAngles { roll, pitch, yaw: yaw.angle() }, mode: mode(yaw.frame()) }
+        }
+        Setpoint::Turn(Turning { roll, pitch, yaw, yaw_frame, .. }) => {
+            Order::Turn { rates: [roll.unwrap_or(AngularRate::ZERO), pitch, yaw], mode: mode(yaw_frame) }
+        }
+    }
+}
+
+fn pose_of(setpoint: Setpoint) -> Option<Pose> {
+    match setpoint {
+        Setpoint::Point(Pointing { pitch, yaw, radio_control: RadioControl::Off, .. }) => Some(Pose { pitch, yaw }),
+        _ => None,
+    }
+}

@@ -1,0 +1,249 @@
+//! What a Gremsy tells of itself, as the manager is told: who it is, what it can do, where it looks.
+
+use super::effect::{Finding, Pose};
+use super::faults::Fault;
+use super::mount::Order;
+use super::operations::{attitude_of, shown_mode};
+use super::{Generation, GremsyDriver};
+use crate::geometry::{Angle, AxisLimits, Limits, Yaw};
+use crate::gimbals::capabilities::Capabilities;
+use crate::gimbals::driver::DriverOutput;
+use crate::gimbals::gremsy::parameters::{AngleLimits, Axis, AxisFlags, Parameter, RcType, TiltSense};
+use crate::gimbals::gremsy::readings::{Negated, Orientation};
+use crate::gimbals::gremsy::status::{Activity, Alignment};
+use crate::gimbals::operation::YawMode;
+use crate::gimbals::report::{GimbalStatus, Identity, Report};
+use crate::timestamp::Timestamp;
+use crate::wire::dialect::MOUNT_ORIENTATION_DATA;
+use crate::wire::ids::{CapFlags, FailureFlags, GimbalFlags};
+use crate::wire::{Frame, MavId};
+
+/// Beside another message, an orientation counts for so long.
+const ORIENTATION_FRESH: std::time::Duration = std::time::Duration::from_millis(500);
+
+impl GremsyDriver {
+    /// `MOUNT_ORIENTATION`: the attitude in v1.
+    pub(super) fn handle_orientation(&mut self, now: Timestamp, device: MavId, frame: &Frame<'_>) {
+        let Some(orientation) = Orientation::read(frame, self.negated) else { return };
+        self.heard.orientation = Some((now, orientation));
+        if self.search.decided() != Some(Generation::V1) {
+            return;
+        }
+        if let Some(message) = frame.decode::<MOUNT_ORIENTATION_DATA>() {
+            self.handle_boot_ms(now, device, message.time_boot_ms);
+        }
+        let is_locked = self.is_locked();
+        let is_wrong = self.version().is_some_and(|version| version.has_wrong_earth_yaw());
+        // In LOCK its yaw from North counts, unless that one is known to be wrong.
+        let attitude = orientation.attitude(is_locked && !is_wrong);
+        let mut flags = GimbalFlags::ROLL_LOCK | GimbalFlags::PITCH_LOCK;
+        flags.set(GimbalFlags::YAW_LOCK, is_locked);
+        flags |= match attitude.yaw() {
+            Yaw::InVehicleFrame(_) => GimbalFlags::YAW_IN_VEHICLE_FRAME,
+            Yaw::InEarthFrame(_) => GimbalFlags::YAW_IN_EARTH_FRAME,
+        };
+        let motors_off = self.heard.status.is_some_and(|(_, status)| !status.motors_on());
+        flags.set(GimbalFlags::RETRACT, motors_off || self.mount.wanted() == Some(Order::Retract));
+        flags.set(GimbalFlags::NEUTRAL, self.mount.wanted() == Some(Order::Home));
+        let is_handed_over = self.is_handed_over || self.mount.wanted() == Some(Order::RadioControl);
+        flags.set(GimbalFlags::RC_EXCLUSIVE, is_handed_over);
+        self.tell_attitude(
+            now,
+            GimbalStatus {
+                attitude,
+                rates: [None; 3],
+                heading: None,
+                flags,
+                failures: self.failures(),
+                accepts_earth_yaw: self.takes_earth_yaw(),
+            },
+        );
+    }
+
+    /// `GIMBAL_DEVICE_ATTITUDE_STATUS`: the attitude in v2.
+    pub(super) fn handle_device_status(&mut self, now: Timestamp, status: GimbalStatus) {
+        self.heard.device_status = Some(now);
+        self.search.handle_attitude_status();
+        if self.search.decided() != Some(Generation::V2) {
+            return;
+        }
+        if let (Some(change), Some(device)) = (self.mode_change, self.device) {
+            let step = change.handle_flags(status.flags);
+            self.handle_mode_step(now, device, step);
+        }
+        let status = GimbalStatus { failures: status.failures | self.failures(), ..status };
+        let is_wrong = self.version().is_some_and(|version| version.has_wrong_earth_yaw());
+        let status = if is_wrong { self.without_earth_yaw(now, status) } else { status };
+        self.tell_attitude(now, status);
+    }
+
+    /// Its yaw from North is not believed: yaw comes from the nose, and the autopilot says where that points.
+    fn without_earth_yaw(&self, now: Timestamp, status: GimbalStatus) -> GimbalStatus {
+        let angles = status.attitude.angles();
+        let orientation = self.heard.orientation.filter(|(at, _)| now.since(*at) <= ORIENTATION_FRESH);
+        let yaw = match (status.attitude.yaw(), status.heading, orientation) {
+            (yaw @ Yaw::InVehicleFrame(_), ..) => yaw,
+            // What is wrong in both cancels out.
+            (Yaw::InEarthFrame(yaw), Some(heading), _) => Yaw::InVehicleFrame((yaw - heading).wrapped()),
+            (_, None, Some((_, orientation))) => Yaw::InVehicleFrame(orientation.yaw),
+            (yaw, None, None) => yaw,
+        };
+        GimbalStatus { attitude: attitude_of(angles, yaw), heading: None, accepts_earth_yaw: false, ..status }
+    }
+
+    fn tell_attitude(&mut self, now: Timestamp, status: GimbalStatus) {
+        self.heard.attitude = Some((now, status));
+        self.outputs.push_back(DriverOutput::Report(Report::Attitude(status)));
+        let pose = Pose { pitch: status.attitude.angles().pitch, yaw: status.attitude.yaw() };
+        let limits = FailureFlags::AT_PITCH_LIMIT | FailureFlags::AT_YAW_LIMIT | FailureFlags::AT_ROLL_LIMIT;
+        let motors_off = self.heard.status.is_some_and(|(_, status)| !status.motors_on());
+        let at_limit = status.failures.intersects(limits) || motors_off;
+        match self.effect.handle_report(now, pose, at_limit) {
+            Some(Finding::Works) => self.faults.clear(|fault| *fault == Fault::NoEffect),
+            Some(Finding::NoEffect) => self.raise(Fault::NoEffect),
+            Some(Finding::InvertedPitch)
+                if self.settings.report_sign.is_none() && self.search.decided() == Some(Generation::V1) =>
+            {
+                self.negated = Negated { pitch: !self.negated.pitch, ..self.negated };
+                if self.negated.pitch {
+                    self.raise(Fault::InvertedPitch);
+                } else {
+                    self.faults.clear(|fault| *fault == Fault::InvertedPitch);
+                }
+            }
+            Some(Finding::InvertedPitch) => self.raise(Fault::NoEffect),
+            None => {}
+        }
+    }
+
+    fn is_locked(&self) -> bool {
+        match self.heard.status {
+            Some((_, status)) => shown_mode(status) == YawMode::Lock,
+            None => self.mount.mode() == Some(YawMode::Lock),
+        }
+    }
+
+    /// Whether yaw may be told from North: where the autopilot's attitude keeps it from drifting, and it is not known to be
+    /// wrong.
+    fn takes_earth_yaw(&self) -> bool {
+        let is_wrong = self.version().is_some_and(|version| version.has_wrong_earth_yaw());
+        !is_wrong && self.axis_flags().is_some_and(|flags| flags.contains(AxisFlags::COMBINE_ATTITUDE))
+    }
+
+    pub(super) fn axis_flags(&self) -> Option<AxisFlags> {
+        self.number(Parameter::AxisFlags).map(AxisFlags::from_bits_retain)
+    }
+
+    /// A parameter by what it is for.
+    pub(super) fn number(&self, parameter: Parameter) -> Option<i16> {
+        let name = self.table()?.name(parameter)?;
+        self.parameters.value(name).map(|value| value as i16)
+    }
+
+    fn failures(&self) -> FailureFlags {
+        let Some((_, status)) = self.heard.status else { return FailureFlags::empty() };
+        let (activity, alignment) = (status.activity, status.alignment);
+        let is_starting = activity.contains(Activity::STARTING_UP);
+        let encoders = Alignment::ENCODER_TILT | Alignment::ENCODER_ROLL | Alignment::ENCODER_PAN;
+        let mut failures = FailureFlags::empty();
+        failures.set(FailureFlags::ENCODER_ERROR, alignment.intersects(encoders) && !is_starting);
+        let motors = Activity::MOTOR_PHASE_ERROR | Activity::MOTOR_ANGLE_ERROR;
+        failures.set(FailureFlags::MOTOR_ERROR, activity.intersects(motors));
+        let sensors = activity.contains(Activity::SENSOR_ERROR) || alignment.contains(Alignment::IMU);
+        failures.set(FailureFlags::SOFTWARE_ERROR, sensors && !is_starting);
+        failures.set(FailureFlags::POWER_ERROR, activity.contains(Activity::BATTERY_LOW));
+        let calibrates = Activity::CALIBRATING | Activity::AUTO_TUNE;
+        failures.set(FailureFlags::CALIBRATION_RUNNING, activity.intersects(calibrates));
+        failures
+    }
+
+    /// Tells who it is and what it can do, where that has changed.
+    pub(super) fn report_known(&mut self) {
+        let known = (self.identity(), self.capabilities());
+        if self.reported.as_ref() != Some(&known) {
+            self.reported = Some(known.clone());
+            self.outputs.push_back(DriverOutput::Report(Report::Known(known.0, known.1)));
+        }
+    }
+
+    fn identity(&self) -> Identity {
+        let told = self.information.as_ref().map(|information| information.identity.clone()).unwrap_or_default();
+        let or = |text: String, otherwise: &str| if text.is_empty() { otherwise.to_owned() } else { text };
+        Identity {
+            vendor: or(told.vendor, "GREMSY"),
+            model: or(told.model, "gimbal"),
+            firmware: told.firmware.or_else(|| self.version().map(|version| version.to_information())),
+            ..told
+        }
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        let told = self.information.as_ref().map(|information| information.capabilities);
+        let limits = self.limits(told.map(|told| told.limits));
+        match (self.search.decided(), told) {
+            (Some(Generation::V2), Some(told)) => {
+                let infinite = told.flags.contains(CapFlags::SUPPORTS_INFINITE_YAW);
+                let yaw = limits.yaw.filter(|_| !infinite);
+                // "Retract" does work, whatever it is turned into.
+                let flags = told.flags | CapFlags::HAS_RETRACT | CapFlags::HAS_NEUTRAL;
+                Capabilities { flags, limits: Limits { yaw, ..limits }, turns: true }
+            }
+            (_, _) => Capabilities { flags: v1_flags(), limits, turns: true },
+        }
+    }
+
+    /// Its software limits where it tells them, or else its end stops, or else what autopilots let pass.
+    fn limits(&self, told: Option<Limits>) -> Limits {
+        let degrees = Angle::from_degrees;
+        let of = |axis: Axis, told: Option<AxisLimits>, widest: f64| {
+            let value = |name: &str| self.parameters.value(name).map(|value| value as i16);
+            let software = self.table().and_then(|table| AngleLimits::read(table, TiltSense::of(table), axis, value));
+            let software = software.and_then(|limits| {
+                AxisLimits::new(degrees(f64::from(limits.min_deg)), degrees(f64::from(limits.max_deg)))
+            });
+            // One that is 0 to 0 was never set.
+            let software = software.filter(|limits| limits.min() < limits.max());
+            software.or(told).or(AxisLimits::new(degrees(-widest), degrees(widest)))
+        };
+        let told = told.unwrap_or_default();
+        Limits {
+            roll: of(Axis::Roll, told.roll, 180.0),
+            pitch: of(Axis::Tilt, told.pitch, 90.0),
+            yaw: of(Axis::Pan, told.yaw, 180.0),
+        }
+    }
+
+    /// What its settings and its version say of faults.
+    pub(super) fn look_at_settings(&mut self) {
+        if !self.is_present {
+            return;
+        }
+        match self.number(Parameter::RcType).map(RcType::from_code) {
+            Some(RcType::Sync) => self.faults.clear(|fault| matches!(fault, Fault::RadioType(_))),
+            Some(kind) => self.raise(Fault::RadioType(kind)),
+            None => {}
+        }
+        if let Some(version) = self.version().filter(|version| version.has_wrong_earth_yaw()) {
+            self.raise(Fault::EarthYaw(version));
+        }
+        if self.parameters.is_settled() && self.parameters.values().next().is_none() {
+            self.raise(Fault::NoParameters);
+        } else {
+            self.faults.clear(|fault| *fault == Fault::NoParameters);
+        }
+    }
+}
+
+/// Of one that speaks v1, whatever it says of a protocol that it does not use.
+fn v1_flags() -> CapFlags {
+    CapFlags::HAS_RETRACT
+        | CapFlags::HAS_NEUTRAL
+        | CapFlags::HAS_ROLL_AXIS
+        | CapFlags::HAS_ROLL_LOCK
+        | CapFlags::HAS_PITCH_AXIS
+        | CapFlags::HAS_PITCH_LOCK
+        | CapFlags::HAS_YAW_AXIS
+        | CapFlags::HAS_YAW_FOLLOW
+        | CapFlags::HAS_YAW_LOCK
+        | CapFlags::HAS_RC_INPUTS
+}
