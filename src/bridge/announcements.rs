@@ -66,6 +66,7 @@ pub struct Subject<'a> {
     pub name: &'a str,
     pub names: Names,
     pub takeover: Takeover,
+    pub autopilot: Option<MavId>,
 }
 
 impl Default for Announcements {
@@ -77,47 +78,20 @@ impl Default for Announcements {
 impl Announcements {
     /// What is said of `event`. That a gimbal is lost or back is said by [`handle_state`](Self::handle_state).
     pub fn handle_event(&mut self, now: Timestamp, subject: Subject<'_>, event: &Event) -> Option<Announcement> {
-        let name = |id| subject.names.of(id);
         if let Event::Fault { what } = *event {
             return self
                 .may_say(now, (subject.manager, Kind::Fault(what), None), 0)
                 .then(|| Announcement { severity: severity::WARNING, text: signed(subject.name, what) });
         }
-        let (kind, who, text) = match *event {
-            Event::Control(Change { place: Place::Primary, how, who, from: Some(from), to: Some(to) }) => match how {
-                How::Borrowed => (Kind::Borrowed, who, "autopilot borrowed control".to_owned()),
-                How::Restored => (Kind::GivenBack, to, format!("autopilot gave control back to {}", name(to))),
-                How::TakenOver => (Kind::TakenOver, to, format!("{} took control from {}", name(to), name(from))),
-                _ => return None,
-            },
-            Event::Control(Change { place: Place::Primary, how: How::Restored, to: Some(to), .. }) => {
-                (Kind::GivenBack, to, format!("autopilot gave control back to {}", name(to)))
-            }
-            Event::AcquireWar { holder, .. } => {
-                (Kind::AcquireWar, holder, format!("acquire war, {} keeps control", name(holder)))
-            }
-            // Of the war itself it was told.
-            Event::Refused { reason: "acquire_war", .. } => return None,
-            // An exclusive holder is not bothered with what others want.
-            Event::Refused { holder: Some(_), .. } if subject.takeover == Takeover::Exclusive => return None,
-            Event::Refused { who, holder: Some(holder), reason: "holder_must_release" } => {
-                (Kind::Refused, who, format!("{} asks {} for control", name(who), name(holder)))
-            }
-            Event::Refused { who, holder: Some(holder), .. } => {
-                (Kind::Refused, who, format!("{} refused, {} in control", name(who), name(holder)))
-            }
-            Event::Refused { who, holder: None, reason } => {
-                (Kind::Misread, who, format!("{}: {}", name(who), misread(reason)?))
-            }
-            _ => return None,
-        };
+        // Most events are not told, and of those that come by the stream only the first: that one is put into words.
+        let (kind, who) = kind_of(subject, event)?;
         let (severity, kept) = match kind {
             Kind::Refused | Kind::Misread => (severity::NOTICE, NOT_FOR_REFUSALS),
             Kind::AcquireWar => (severity::WARNING, 0),
             _ => (severity::NOTICE, 0),
         };
         self.may_say(now, (subject.manager, kind, Some(who)), kept)
-            .then(|| Announcement { severity, text: signed(subject.name, &text) })
+            .then(|| Announcement { severity, text: signed(subject.name, &text_of(kind, who, subject.names, event)) })
     }
 
     /// Says that a gimbal is lost or back; called again and again, so that what could not be said at once is said later,
@@ -155,6 +129,48 @@ impl Announcements {
     }
 }
 
+/// What kind of news an event is, and about whom; `None` where it is none for the pilot.
+fn kind_of(subject: Subject<'_>, event: &Event) -> Option<(Kind, MavId)> {
+    match *event {
+        Event::Control(Change { place: Place::Primary, how, who, from: Some(_), to: Some(to) }) => match how {
+            How::Borrowed => Some((Kind::Borrowed, who)),
+            How::Restored => Some((Kind::GivenBack, to)),
+            How::TakenOver => Some((Kind::TakenOver, to)),
+            _ => None,
+        },
+        Event::Control(Change { place: Place::Primary, how: How::Restored, to: Some(to), .. }) => {
+            Some((Kind::GivenBack, to))
+        }
+        Event::AcquireWar { holder, .. } => Some((Kind::AcquireWar, holder)),
+        // Of the war itself it was told.
+        Event::Refused { reason: "acquire_war", .. } => None,
+        // An exclusive holder is not bothered with what others want.
+        Event::Refused { holder: Some(_), .. } if subject.takeover == Takeover::Exclusive => None,
+        // PX4 streams what it would have the gimbal do, and counts on being ignored while it has no control.
+        Event::Refused { who, reason: "not_in_control", .. } if subject.autopilot == Some(who) => None,
+        Event::Refused { who, holder: Some(_), .. } => Some((Kind::Refused, who)),
+        Event::Refused { who, holder: None, reason } => misread(reason).map(|_| (Kind::Misread, who)),
+        _ => None,
+    }
+}
+
+fn text_of(kind: Kind, who: MavId, names: Names, event: &Event) -> String {
+    let whom = event.from().map_or_else(String::new, |id| names.of(id));
+    let (who, reason) = (names.of(who), event.reason().unwrap_or_default());
+    match kind {
+        Kind::Lost => "gimbal lost".to_owned(),
+        Kind::Back => "gimbal is back".to_owned(),
+        Kind::Fault(what) => what.to_owned(),
+        Kind::Borrowed => "autopilot borrowed control".to_owned(),
+        Kind::GivenBack => format!("autopilot gave control back to {who}"),
+        Kind::TakenOver => format!("{who} took control from {whom}"),
+        Kind::AcquireWar => format!("acquire war, {who} keeps control"),
+        Kind::Refused if reason == "holder_must_release" => format!("{who} asks {whom} for control"),
+        Kind::Refused => format!("{who} refused, {whom} in control"),
+        Kind::Misread => format!("{who}: {}", misread(reason).unwrap_or(reason)),
+    }
+}
+
 /// What the numbers of a request look like that was refused for them; whoever sends them sees nothing else of it, since
 /// old programs do not look at the answer, and messages have none.
 fn misread(reason: &str) -> Option<&'static str> {
@@ -179,6 +195,7 @@ mod tests {
 
     const GCS: MavId = MavId::new(255, 190);
     const SCRIPT: MavId = MavId::new(245, 191);
+    const AUTOPILOT: MavId = MavId::new(1, 1);
 
     /// "The same text kind per gimbal and sender at most once in 10 s."
     #[test]
@@ -244,6 +261,18 @@ mod tests {
         assert_eq!(announcements.handle_event(Timestamp::ZERO, exclusive, &refused(SCRIPT)), None);
     }
 
+    /// PX4 "relies on us to ignore it when it does not hold control. Ignoring must be silent"; a claim that it was denied is
+    /// told.
+    #[test]
+    fn an_autopilot_that_streams_without_control_is_no_news() {
+        let mut announcements = Announcements::default();
+        let open = subject(191, Takeover::Open);
+        assert_eq!(announcements.handle_event(Timestamp::ZERO, open, &refused(AUTOPILOT)), None);
+        let claim = Event::Refused { who: AUTOPILOT, reason: "holder_ranks_no_lower", holder: Some(GCS) };
+        let said = announcements.handle_event(Timestamp::ZERO, open, &claim).expect("it is said");
+        assert_eq!(said.text, "camera: 1/1 refused, 255/190 in control");
+    }
+
     /// "At most 50 characters each", whatever the gimbal's name.
     #[test]
     fn a_text_is_never_too_long() {
@@ -269,7 +298,7 @@ mod tests {
     }
 
     fn subject(manager: u8, takeover: Takeover) -> Subject<'static> {
-        Subject { manager, name: "camera", names: Names::default(), takeover }
+        Subject { manager, name: "camera", names: Names::default(), takeover, autopilot: Some(AUTOPILOT) }
     }
 
     fn refused(who: MavId) -> Event {

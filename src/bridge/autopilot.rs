@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use super::Bridge;
 use super::settings::{Role, Transport};
 use super::state_for_gimbals::{LONGEST, SHORTEST, Source};
 use super::streams::Need;
 use super::transactions::{Asker, Order};
+use super::{Bridge, surroundings};
 use crate::channel::{ChannelId, ChannelSet};
 use crate::gimbals::mavlink_v2::packet;
 use crate::manager::DeviceState;
@@ -128,6 +128,10 @@ impl Bridge {
         if self.vehicle.restarts() != restarts {
             tracing::info!("autopilot restarted");
             self.streams.handle_autopilot_found(now);
+            let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
+            for gimbal in self.roster.iter_mut() {
+                gimbal.manager.handle_autopilot_restarted(now, frame.source(), around);
+            }
         }
         self.streams.handle_seen(now, frame.message_id());
         match frame.message_id() {

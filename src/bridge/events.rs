@@ -101,7 +101,7 @@ impl Bridge {
     pub(super) fn handle_event(&mut self, now: Timestamp, at: usize, event: Event) {
         let component = self.roster.get_mut(at).component;
         let names = self.names(component);
-        let subject = subject(self.roster.get_mut(at), names);
+        let subject = subject(self.roster.get_mut(at), names, self.autopilot);
         self.events.note(now, subject.name, names, event);
         let announcement = self.announcements.handle_event(now, subject, &event);
         self.announce(now, component, announcement);
@@ -113,7 +113,7 @@ impl Bridge {
         let component = self.roster.get_mut(at).component;
         let names = self.names(component);
         let gimbal = self.roster.get_mut(at);
-        let (state, subject) = (gimbal.manager.state(), subject(gimbal, names));
+        let (state, subject) = (gimbal.manager.state(), subject(gimbal, names, self.autopilot));
         let announcement = self.announcements.handle_state(now, subject, state);
         self.announce(now, component, announcement);
     }
@@ -132,9 +132,9 @@ fn is_repetitive(event: &Event) -> bool {
 }
 
 /// The gimbal as texts about it name it.
-fn subject(gimbal: &Gimbal, names: Names) -> Subject<'_> {
+fn subject(gimbal: &Gimbal, names: Names, autopilot: Option<MavId>) -> Subject<'_> {
     let settings = gimbal.manager.settings();
-    Subject { manager: gimbal.component, name: &settings.name, names, takeover: settings.takeover }
+    Subject { manager: gimbal.component, name: &settings.name, names, takeover: settings.takeover, autopilot }
 }
 
 impl Entry {

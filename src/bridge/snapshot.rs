@@ -35,7 +35,7 @@ pub struct EventSnapshot {
     pub first_at_s: f64,
     pub count: u64,
     pub gimbal: String,
-    /// `taken`, `taken_over`, `borrowed`, `restored`, `delegated`, `released`, `cleared`, `lapsed`, `system_gone`,
+    /// `taken`, `taken_over`, `borrowed`, `restored`, `delegated`, `released`, `cleared`, `lapsed`, `holder_restarted`, `system_gone`,
     /// `refused`, `acquire_war`, `gimbal_found`, `gimbal_back`, `gimbal_lost`, `gimbal_restarted`, `fault`, `operated`, `rates_ended`, `roi_started` or
     /// `roi_ended`.
     pub what: String,

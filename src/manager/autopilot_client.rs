@@ -51,6 +51,11 @@ impl AutopilotClient {
         }
     }
 
+    /// It has started again.
+    pub(super) fn handle_restarted(&mut self) {
+        *self = Self::default();
+    }
+
     pub(super) fn handle_changes_of_control(&mut self, now: Timestamp, changes: &[Change]) {
         for change in changes.iter().filter(|change| change.place == Place::Primary) {
             self.is_borrower &= change.to == self.id;

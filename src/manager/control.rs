@@ -103,6 +103,8 @@ pub enum How {
     Cleared,
     /// Its holder was silent for the lease.
     Lapsed,
+    /// Its holder has started again, and does not know of it.
+    Restarted,
     /// The holder's system is another vehicle's, or not ours any more.
     SystemGone,
 }
@@ -198,6 +200,11 @@ impl Control {
     /// Clears the places of holders silent for `lease`.
     pub fn handle_timeout(&mut self, now: Timestamp, lease: Duration) -> Vec<Change> {
         self.clear_where(now, How::Lapsed, |holder| now.since(holder.heard) >= lease)
+    }
+
+    /// Takes every place from one that has started again and does not know of it.
+    pub fn handle_restarted(&mut self, now: Timestamp, id: MavId) -> Vec<Change> {
+        self.clear_where(now, How::Restarted, |holder| holder.id == id)
     }
 
     /// Takes every place from components of `system`.

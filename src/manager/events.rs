@@ -111,6 +111,7 @@ impl Event {
                 How::Released => "released",
                 How::Cleared => "cleared",
                 How::Lapsed => "lapsed",
+                How::Restarted => "holder_restarted",
                 How::SystemGone => "system_gone",
             },
             Self::Refused { .. } => "refused",
@@ -294,6 +295,7 @@ fn describe_change(change: Change, names: Names) -> String {
         How::Released => format!("{who} released {control}"),
         How::Cleared => format!("{who} ended the {control} of {from}"),
         How::Lapsed => format!("{who} is silent and lost {control}"),
+        How::Restarted => format!("{who} has started again and lost {control}"),
         How::SystemGone => format!("{who} is no part of this vehicle and lost {control}"),
     }
 }
@@ -316,6 +318,7 @@ mod tests {
             ),
             (change(How::Restored, autopilot, None, Some(gcs)), "255/190 has control back from the autopilot"),
             (change(How::Lapsed, gcs, Some(gcs), None), "255/190 is silent and lost control"),
+            (change(How::Restarted, gcs, Some(gcs), None), "255/190 has started again and lost control"),
             (
                 Event::Refused { who: script, reason: "not_in_control", holder: Some(gcs) },
                 "245/191 was refused: 255/190 is in control",

@@ -32,6 +32,17 @@ impl GimbalManager {
         self.carry_out(now, around);
     }
 
+    /// The autopilot has started again, and knows nothing of what it asked for: what it had goes back, and its rates end.
+    pub fn handle_autopilot_restarted(&mut self, now: Timestamp, autopilot: MavId, around: Surroundings<'_>) {
+        let changes = self.control.handle_restarted(now, autopilot);
+        self.after_changes_of_control(now, &changes);
+        if self.tracking.source() == Some(autopilot) {
+            self.tracking.stop_rates(now);
+        }
+        self.autopilot_client.handle_restarted();
+        self.carry_out(now, around);
+    }
+
     pub(super) fn policy<'a>(&self, around: Surroundings<'a>) -> Policy<'a> {
         Policy {
             open_when_unclaimed: self.rules.open_when_unclaimed,

@@ -5,8 +5,10 @@ use std::time::Duration;
 use gimbald::bridge::settings::{Role, Settings, SystemId, Transport};
 use gimbald::bridge::{Bridge, ChannelId, Input};
 use gimbald::timestamp::Timestamp;
+use gimbald::wire::dialect::MavMessage;
 use gimbald::wire::{FrameBuffer, MavId};
 
+use crate::support::script::{NAN, device_information, set_pitchyaw, take_control, usual_capabilities};
 use crate::support::tlog;
 use crate::support::world::{AUTOPILOT, GCS, GIMBAL, heartbeat, link};
 
@@ -45,6 +47,39 @@ fn forwarding_in_the_steady_state_allocates_nothing() {
 
     assert_eq!((counted.count_total, counted.bytes_total), (0, 0));
     assert!(forwarded > 2 * others.len(), "{forwarded} outputs of {} frames", 2 * others.len());
+}
+
+/// "Ignoring must be silent and cheap" (peers notes 2.2): PX4 as our client streams `GIMBAL_MANAGER_SET_PITCHYAW` while another
+/// is in control, and each is refused without an allocation and without a word.
+#[test]
+fn refusing_a_stream_allocates_nothing_and_says_nothing() {
+    let mut bridge = bridge();
+    let mut now = Timestamp::ZERO;
+    let mut buffer = FrameBuffer::default();
+    let capabilities = usual_capabilities();
+    let information = MavMessage::GIMBAL_DEVICE_INFORMATION(device_information(now, capabilities));
+    let information = buffer.encode_any(GIMBAL, 1, &information).bytes().to_vec();
+    receive(&mut bridge, now, 1, &information);
+    let claim = buffer.encode_any(GCS, 1, &take_control()).bytes().to_vec();
+    receive(&mut bridge, now, 2, &claim);
+    let demand = buffer.encode_any(AUTOPILOT, 1, &set_pitchyaw(-0.5, 0.5, NAN, NAN, 8)).bytes().to_vec();
+    let mut refuse = |times: u32| {
+        let mut said = 0;
+        for _ in 0..times {
+            now += Duration::from_millis(10);
+            said += receive(&mut bridge, now, 0, &demand);
+        }
+        said
+    };
+    // The first, second, fourth … is written to the journal at level debug: so the count is not to double meanwhile.
+    refuse(300);
+
+    let mut said = 0;
+    let counted = allocation_counter::measure(|| said = refuse(200));
+
+    assert_eq!((counted.count_total, counted.bytes_total, said), (0, 0, 0));
+    let rejected = &bridge.snapshot(now).gimbals[0].rejected["1/1"];
+    assert_eq!(rejected["not_in_control"], 500, "{rejected:?}");
 }
 
 /// Hands one read to the core and takes what is sent; how often anything was.

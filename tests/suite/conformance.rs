@@ -10,6 +10,8 @@ mod manager;
 mod mavsdk_trace;
 mod own_commands;
 mod presented_device;
+mod px4_client;
+
 mod rivals;
 mod spoken_for;
 mod state_for_gimbals;
