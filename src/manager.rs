@@ -21,6 +21,7 @@ mod device;
 mod heading;
 mod inquiries;
 mod mount;
+mod mount_reports;
 mod ownership;
 pub mod roi;
 mod telling;
@@ -48,6 +49,7 @@ use heading::HeadingBias;
 use intervals::{DEFAULT_STATUS_INTERVAL, Schedule};
 use messages::Interval;
 use mount::MountSenders;
+use mount_reports::MountReports;
 use rank::Ranks;
 use request::{Demand, DemandKind, Refusal, Request};
 use settings::ControlSettings;
@@ -151,6 +153,7 @@ pub struct GimbalManager {
     tracking: Tracking,
     status_schedule: Schedule,
     information_schedule: Schedule,
+    mount_reports: MountReports,
     /// What it says for a gimbal that is no v2 device.
     voice: Option<DeviceVoice>,
     /// The device id of the gimbal if it is none.
@@ -180,6 +183,7 @@ impl GimbalManager {
     /// `number`: the device id that is kept for the gimbal in case that it is no v2 device, 1 to 6.
     pub fn new(settings: GimbalSettings, rules: ControlSettings, number: Option<u8>) -> Self {
         let always_spoken_for = settings.family.speaks_through_manager();
+        let mount_reports = MountReports::new(settings.v1_status);
         Self {
             tracking: Tracking::new(settings.setpoint_rate_hz),
             settings,
@@ -194,6 +198,7 @@ impl GimbalManager {
             control: Control::default(),
             status_schedule: Schedule::new(Interval::Every(DEFAULT_STATUS_INTERVAL)),
             information_schedule: Schedule::new(Interval::Off),
+            mount_reports,
             voice: number.filter(|_| always_spoken_for).map(DeviceVoice::new),
             number,
             source_heard: Timestamp::ZERO,
@@ -214,6 +219,7 @@ impl GimbalManager {
     pub fn open_channel(&mut self, now: Timestamp, channel: ChannelId) {
         self.status_schedule.open(now, channel);
         self.information_schedule.open(now, channel);
+        self.mount_reports.open(now, channel);
         if let Some(voice) = &mut self.voice {
             voice.schedule.open(now, channel);
         }
@@ -222,6 +228,7 @@ impl GimbalManager {
     pub fn close_channel(&mut self, channel: ChannelId) {
         self.status_schedule.close(channel);
         self.information_schedule.close(channel);
+        self.mount_reports.close(channel);
         if let Some(voice) = &mut self.voice {
             voice.schedule.close(channel);
         }
@@ -306,13 +313,19 @@ impl GimbalManager {
         {
             self.outputs.push_back(ManagerOutput::Broadcast { channels: Some(due), message });
         }
+        self.tell_mount_reports(now, around);
         self.tracking.handle_timeout(now);
         self.carry_out(now, around);
     }
 
     pub fn poll_timeout(&self) -> Option<Timestamp> {
         let voice = self.voice.as_ref().and_then(|voice| voice.schedule.poll_timeout());
-        let schedules = [self.status_schedule.poll_timeout(), self.information_schedule.poll_timeout(), voice];
+        let schedules = [
+            self.status_schedule.poll_timeout(),
+            self.information_schedule.poll_timeout(),
+            self.mount_reports.poll_timeout(),
+            voice,
+        ];
         // Without a device there is nothing to tell of.
         let schedules = schedules.into_iter().flatten().filter(|_| self.device.is_some());
         let lease = self.rules.lease_timeout;

@@ -117,6 +117,7 @@ fn gimbal(gimbal: Gimbal, links: &[LinkSettings]) -> GimbalSettings {
             configures: value_or(gimbal.v1_configure, default.v1.configures),
             radio_control: value_or(gimbal.v1_radio_control, default.v1.radio_control),
         },
+        v1_status: value_or(gimbal.v1_status, default.v1_status),
         gremsy: GremsySettings {
             generation: value_or(gimbal.gremsy_generation, default.gremsy.generation),
             retract_allowed: value_or(gimbal.retract_allowed, default.gremsy.retract_allowed),

@@ -19,6 +19,8 @@ pub struct GimbalSettings {
     pub device_yaw_frame: DeviceYawFrame,
     /// Of a v1 gimbal.
     pub v1: V1Settings,
+    /// Ground stations of gimbal protocol v1 are told where it looks, whatever it speaks itself.
+    pub v1_status: bool,
     /// Of a Gremsy.
     pub gremsy: GremsySettings,
     /// Full deflection of manual control (288), degrees per second.
@@ -39,6 +41,7 @@ impl GimbalSettings {
             setpoint_rate_hz: 20,
             device_yaw_frame: DeviceYawFrame::Auto,
             v1: V1Settings::default(),
+            v1_status: false,
             gremsy: GremsySettings::default(),
             manual_pitch_rate_dps: 30.0,
             manual_yaw_rate_dps: 30.0,

@@ -40,6 +40,10 @@ impl GimbalManager {
             Some(message::GIMBAL_DEVICE_ATTITUDE_STATUS) if self.voice.is_some() => {
                 self.device_attitude_status(now, around).ok_or(not_yet)?
             }
+            Some(id @ (message::MOUNT_STATUS | message::MOUNT_ORIENTATION)) => {
+                let refusal = if self.device().is_none() { not_yet } else { Refusal::later("no_attitude") };
+                self.mount_report(now, id, around).ok_or(refusal)?
+            }
             Some(message::HEARTBEAT) if command.is_directed() => {
                 let channels = (!to_everybody).then(|| sender.channel.into());
                 self.outputs.push_back(ManagerOutput::Heartbeat { channels });
@@ -66,7 +70,10 @@ impl GimbalManager {
             (Some(message::GIMBAL_MANAGER_STATUS), _) => &mut self.status_schedule,
             (Some(message::GIMBAL_MANAGER_INFORMATION), _) => &mut self.information_schedule,
             (Some(message::GIMBAL_DEVICE_ATTITUDE_STATUS), Some(voice)) => &mut voice.schedule,
-            (id, _) => return not_ours(command, id),
+            (id, _) => match id.and_then(|id| self.mount_reports.schedule_mut(id)) {
+                Some(schedule) => schedule,
+                None => return not_ours(command, id),
+            },
         };
         let set = schedule.set(now, sender.channel, micros);
         set.map_err(|_| Refusal::denied("invalid_interval"))?;
@@ -89,7 +96,10 @@ impl GimbalManager {
             (message::GIMBAL_MANAGER_STATUS, _) => self.status_schedule.interval(sender.channel),
             (message::GIMBAL_MANAGER_INFORMATION, _) => self.information_schedule.interval(sender.channel),
             (message::GIMBAL_DEVICE_ATTITUDE_STATUS, Some(voice)) => voice.schedule.interval(sender.channel),
-            _ => Interval::NotAvailable,
+            (id, _) => {
+                let schedule = self.mount_reports.schedule(id);
+                schedule.map_or(Interval::NotAvailable, |schedule| schedule.interval(sender.channel))
+            }
         };
         messages::message_interval(message_id, interval)
     }

@@ -250,6 +250,7 @@ fn numbers_have_ranges_and_kinds() {
         ("v1_sign = { pitch = \"-1\" }", "found a table; expected 1 or -1 for pitch"),
         ("v1_report_sign = { tilt = -1 }", "found a table; expected a table with roll, pitch and yaw"),
         ("v1_report_sign = -1", "found -1; expected normal or reversed, or a table such as { pitch = -1, yaw = -1 }"),
+        ("v1_status = 10", "found 10; expected true or false"),
         ("v1_configure = \"px4\"", "found \"px4\"; expected true or false"),
         ("v1_radio_control = \"mod\"", "found \"mod\"; expected none, silence or mode; did you mean mode?"),
         ("family = \"siyi\"", "found \"siyi\"; expected auto, mavlink_v2, mavlink_v1 or gremsy"),
@@ -649,6 +650,7 @@ v1_sign = { pitch = -1, roll = 1.0, yaw = -1 }
 v1_report_sign = "reversed"
 v1_configure = true
 v1_radio_control = "mode"
+v1_status = true
 gremsy_generation = "v1"
 gremsy_report_sign = "reversed"
 retract_allowed = true
@@ -722,6 +724,7 @@ fn every_key_arrives_where_it_belongs() {
                     configures: true,
                     radio_control: V1RadioControl::Mode,
                 },
+                v1_status: true,
                 gremsy: GremsySettings {
                     generation: Some(Generation::V1),
                     retract_allowed: true,
@@ -833,6 +836,7 @@ fn variables_override_the_file() {
         ("GIMBALD__GIMBAL__NOSE_CAM__V1_REPORT_SIGN", "reversed"),
         ("GIMBALD__GIMBAL__NOSE_CAM__V1_CONFIGURE", "true"),
         ("GIMBALD__GIMBAL__NOSE_CAM__V1_RADIO_CONTROL", "mode"),
+        ("GIMBALD__GIMBAL__NOSE_CAM__V1_STATUS", "true"),
         ("GIMBALD__GIMBAL__NOSE_CAM__GREMSY_GENERATION", "v1"),
         ("GIMBALD__GIMBAL__NOSE_CAM__GREMSY_REPORT_SIGN", "reversed"),
         ("GIMBALD__GIMBAL__NOSE_CAM__RETRACT_ALLOWED", "true"),

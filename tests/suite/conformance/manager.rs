@@ -15,6 +15,7 @@ mod events;
 mod frames;
 mod mount;
 mod mount_messages;
+mod mount_reports;
 mod mount_traps;
 mod outcomes;
 mod presence;
