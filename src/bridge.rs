@@ -14,6 +14,7 @@ mod delivery;
 mod devices;
 mod events;
 mod firewall;
+mod gimbal_streams;
 mod heartbeat;
 mod identity;
 mod outbox;
@@ -50,6 +51,7 @@ use asked::UnderWay;
 use channels::Channels;
 use conflicts::Conflicts;
 use events::Events;
+use gimbal_streams::GimbalStreams;
 use identity::Identity;
 use outbox::Outbox;
 use presenting::Presented;
@@ -138,6 +140,7 @@ pub struct Bridge {
     ranks: Ranks,
     roster: Roster,
     streams: AutopilotStreams,
+    gimbal_streams: GimbalStreams,
     state_for_gimbals: StateForGimbals,
     transactions: Transactions,
     conflicts: Conflicts,
@@ -185,6 +188,7 @@ impl Bridge {
             ranks: Ranks::default(),
             roster: Roster::new(&settings),
             streams: AutopilotStreams::default(),
+            gimbal_streams: GimbalStreams::default(),
             state_for_gimbals: StateForGimbals::default(),
             transactions: Transactions::default(),
             events: Events::default(),
@@ -325,6 +329,7 @@ impl Bridge {
         self.channels.close(channel);
         self.router.close_channel(channel);
         self.roster.close_channel(channel);
+        self.gimbal_streams.close_channel(channel);
         self.presented.close_channel(channel);
     }
 

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::settings::{Role, Transport};
 use super::state_for_gimbals::{LONGEST, SHORTEST, Source};
-use super::streams::Need;
+use super::streams::{Ask, Need};
 use super::transactions::{Asker, Order};
 use super::{Bridge, surroundings};
 use crate::channel::{ChannelId, ChannelSet};
@@ -12,7 +12,7 @@ use crate::gimbals::mavlink_v2::packet;
 use crate::manager::DeviceState;
 use crate::timestamp::Timestamp;
 use crate::vehicle::Autopilot;
-use crate::wire::dialect::{MavMessage, TIMESYNC_DATA};
+use crate::wire::dialect::{MavMessage, REQUEST_DATA_STREAM_DATA, TIMESYNC_DATA};
 use crate::wire::ids::{command, message};
 use crate::wire::{Frame, MavId, Target};
 
@@ -65,6 +65,12 @@ impl Bridge {
         if self.state_for_gimbals.is_ours() {
             self.need_what_state_is_made_of(now);
         }
+        // What a gimbal asked the autopilot for by a message that it may not know.
+        for message_id in [message::ATTITUDE, message::GLOBAL_POSITION_INT] {
+            if let Some(interval) = self.gimbal_streams.wanted(message_id) {
+                self.streams.raise_need(message_id, interval);
+            }
+        }
     }
 
     /// An attitude as often as gimbals are to be told, as far as the line to the autopilot can carry it, and the rest
@@ -101,10 +107,25 @@ impl Bridge {
 
     pub(super) fn ask_autopilot(&mut self, now: Timestamp) {
         let Some(autopilot) = self.autopilot.filter(|_| self.may_ask_autopilot()) else { return };
-        let Some((message_id, interval)) = self.streams.take_due(now) else { return };
-        let command = packet::set_message_interval(autopilot, message_id, interval);
+        let Some(ask) = self.streams.take_due(now) else { return };
         let manager = self.roster.get_mut(0).component;
-        self.transactions.send(now, Order { asker: Asker::Streams { message_id }, manager, command });
+        match ask {
+            Ask::MessageInterval { message_id, interval } => {
+                let command = packet::set_message_interval(autopilot, message_id, interval);
+                self.transactions.send(now, Order { asker: Asker::Streams { message_id }, manager, command });
+            }
+            Ask::DataStream { group, rate_hz } => {
+                let request = MavMessage::REQUEST_DATA_STREAM(REQUEST_DATA_STREAM_DATA {
+                    req_message_rate: rate_hz,
+                    target_system: autopilot.system,
+                    target_component: autopilot.component,
+                    req_stream_id: group,
+                    start_stop: 1,
+                });
+                let channels = self.router.route_own(now, Target::Component(autopilot));
+                self.send(now, channels, manager, &request);
+            }
+        }
     }
 
     /// Asks once for a message, in the name of a manager that needs it.

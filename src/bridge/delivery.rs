@@ -10,7 +10,7 @@ use crate::channel::{ChannelId, ChannelSet};
 use crate::manager::request::read_request;
 use crate::manager::{Sender, Surroundings};
 use crate::timestamp::Timestamp;
-use crate::wire::dialect::{HEARTBEAT_DATA, SYSTEM_TIME_DATA};
+use crate::wire::dialect::{HEARTBEAT_DATA, REQUEST_DATA_STREAM_DATA, SYSTEM_TIME_DATA};
 use crate::wire::ids::{command, component, mav_autopilot, mav_type, message};
 use crate::wire::{Frame, MavId, Target};
 
@@ -47,6 +47,15 @@ impl Bridge {
                 }
             }
             message::COMMAND_ACK if !ours => self.handle_command_ack(now, frame),
+            message::REQUEST_DATA_STREAM if role == Role::Gimbal => {
+                // It goes on to the autopilot besides, as it came.
+                if let Some(request) = frame.decode::<REQUEST_DATA_STREAM_DATA>()
+                    && self.autopilot.is_none_or(|autopilot| frame.target().includes(autopilot))
+                {
+                    self.gimbal_streams.handle_request(now, from, &request);
+                    self.look_after_streams(now);
+                }
+            }
             // Another component of the vehicle may tell gimbals in the autopilot's stead.
             message::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE
                 if !ours
@@ -83,7 +92,7 @@ impl Bridge {
     fn handle_autopilot(&mut self, now: Timestamp, link: LinkIndex, role: Role, frame: &Frame<'_>) {
         if role != Role::Ground {
             self.autopilot_heard = Some(now);
-        } else if self.autopilot_heard.is_some_and(|at| now.since(at) < AUTOPILOT_GONE) {
+        } else if !self.is_believed_autopilot(now, role, frame.source()) {
             // Another vehicle of the same id, whose attitude would turn our camera.
             if frame.message_id() == message::HEARTBEAT {
                 self.conflicts.note(now, Conflict::AutopilotTwice { autopilot: frame.source(), other_on: link });
@@ -92,6 +101,12 @@ impl Bridge {
         }
         self.take_vehicle_frame(now, frame);
         self.show_vehicle(now, frame.message_id());
+    }
+
+    /// Whether `source` is our autopilot, and not another vehicle's of the same id.
+    fn is_believed_autopilot(&self, now: Timestamp, role: Role, source: MavId) -> bool {
+        let speaks_elsewhere = self.autopilot_heard.is_some_and(|at| now.since(at) < AUTOPILOT_GONE);
+        self.autopilot == Some(source) && (role != Role::Ground || !speaks_elsewhere)
     }
 
     /// The managers are shown what one message of the autopilot changed.
@@ -243,7 +258,7 @@ impl Bridge {
         }
         let gimbals = channels.intersection(self.channels.with_role(Role::Gimbal));
         if !gimbals.is_empty() {
-            let barred = gimbals.without(self.passing_to_gimbals(now, frame, gimbals));
+            let barred = gimbals.without(self.passing_to_gimbals(now, role, frame, gimbals));
             channels = self.drop_towards(channels, barred, "not_for_gimbal");
         }
         channels = self.channels.limit_rate(now, channels, frame);
@@ -284,7 +299,7 @@ impl Bridge {
 
     /// R18: which of `gimbals`, all of that role, get the frame: what is addressed to a component known there, and
     /// the little that a gimbal uses of what is said to all.
-    fn passing_to_gimbals(&self, now: Timestamp, frame: &Frame<'_>, gimbals: ChannelSet) -> ChannelSet {
+    fn passing_to_gimbals(&mut self, now: Timestamp, role: Role, frame: &Frame<'_>, gimbals: ChannelSet) -> ChannelSet {
         // Until our system id is settled nothing passes: a gimbal takes the id of the first heartbeat it hears.
         if self.identity.system().is_none() {
             return ChannelSet::EMPTY;
@@ -316,6 +331,11 @@ impl Bridge {
             | message::PARAM_EXT_REQUEST_READ
             | message::PARAM_EXT_REQUEST_LIST
             | message::PARAM_EXT_SET => gimbals,
+            message::ATTITUDE | message::GLOBAL_POSITION_INT
+                if self.is_believed_autopilot(now, role, frame.source()) =>
+            {
+                self.gimbal_streams.admit(now, frame.message_id(), gimbals)
+            }
             // The firewall keeps it away, or is told to let it pass.
             message::GIMBAL_DEVICE_SET_ATTITUDE => gimbals.intersection(self.channels_of_devices(frame.target())),
             _ => ChannelSet::EMPTY,

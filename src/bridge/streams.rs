@@ -1,13 +1,15 @@
 //! Messages that the autopilot does not send unasked, or not often enough, and that we or the gimbal need.
 //!
 //! `SET_MESSAGE_INTERVAL` (511) for each one that is missing while the autopilot is alive, until it comes or is refused.
+//! Autopilots from before that command know groups of messages: where it is refused or ignored, `REQUEST_DATA_STREAM` (66)
+//! for the group.
 
 use std::time::Duration;
 
 use super::transactions;
 use crate::gimbals::CommandOutcome;
 use crate::timestamp::Timestamp;
-use crate::wire::ids::{CommandResult, message};
+use crate::wire::ids::{CommandResult, mav_data_stream, message};
 
 /// A message not seen for so long is missing.
 const MISSING_AFTER: Duration = Duration::from_secs(2);
@@ -44,6 +46,27 @@ pub enum Need {
     AtLeast(Duration),
 }
 
+/// How a message is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ask {
+    /// 511, which is answered.
+    MessageInterval { message_id: u32, interval: Duration },
+    /// 66, which is not: a group (`MAV_DATA_STREAM`) and messages per second.
+    DataStream { group: u8, rate_hz: u16 },
+}
+
+/// By which of the two a message is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Way {
+    MessageInterval,
+    /// In turn: the autopilot ignores the command, or the way to it loses much.
+    Either {
+        data_stream_next: bool,
+    },
+    /// It refused the command.
+    DataStream,
+}
+
 /// A message, and what became of asking for it.
 #[derive(Clone, Copy, Debug)]
 struct Wanted {
@@ -57,6 +80,7 @@ struct Wanted {
     tries: u8,
     faster_requests: u8,
     refused: bool,
+    way: Way,
 }
 
 /// What we want of the autopilot.
@@ -123,6 +147,13 @@ impl AutopilotStreams {
             }
             CommandOutcome::Unanswered => wanted.tries = wanted.tries.saturating_add(transactions::TRIES),
         }
+        if wanted.group().is_some() {
+            if wanted.refused {
+                wanted.way = Way::DataStream;
+            } else if wanted.way == Way::MessageInterval && wanted.tries >= IGNORED_AFTER {
+                wanted.way = Way::Either { data_stream_next: true };
+            }
+        }
     }
 
     /// Whether `message_id` was asked for and will not come: "the request was refused or ignored three times".
@@ -143,8 +174,8 @@ impl AutopilotStreams {
         self.wanted.iter().filter_map(|wanted| wanted.due(since)).min()
     }
 
-    /// A message to ask for at `now`, with its interval; the next one when this request is done with.
-    pub fn take_due(&mut self, now: Timestamp) -> Option<(u32, Duration)> {
+    /// What to ask for at `now`; the next one when this request is done with.
+    pub fn take_due(&mut self, now: Timestamp) -> Option<Ask> {
         let since = self.since?;
         let wanted = self.wanted.iter_mut().find(|wanted| wanted.due(since).is_some_and(|due| due <= now))?;
         let (Need::Some(interval) | Need::AtLeast(interval)) = wanted.need else { return None };
@@ -152,7 +183,18 @@ impl AutopilotStreams {
             wanted.faster_requests += 1;
         }
         wanted.asked = Some(now);
-        Some((wanted.message_id, interval))
+        Some(wanted.ask(interval))
+    }
+
+    /// Asks for more of a message than was set, if that is less.
+    pub fn raise_need(&mut self, message_id: u32, interval: Duration) {
+        let Some(wanted) = self.find_mut(message_id) else { return };
+        wanted.need = match wanted.need {
+            Need::AtLeast(known) => Need::AtLeast(known.min(interval)),
+            // What does not come at all is asked for as often as anybody needs it.
+            Need::Some(known) if wanted.seen.is_none() => Need::AtLeast(known.min(interval)),
+            Need::None | Need::Some(_) => Need::AtLeast(interval),
+        };
     }
 
     fn find(&self, message_id: u32) -> Option<&Wanted> {
@@ -175,11 +217,33 @@ impl Wanted {
             tries: 0,
             faster_requests: 0,
             refused: false,
+            way: Way::MessageInterval,
+        }
+    }
+
+    /// The group (`MAV_DATA_STREAM`) in which autopilots of before 511 send it.
+    const fn group(&self) -> Option<u8> {
+        match self.message_id {
+            message::ATTITUDE => Some(mav_data_stream::EXTRA1),
+            message::GLOBAL_POSITION_INT => Some(mav_data_stream::POSITION),
+            _ => None,
+        }
+    }
+
+    fn ask(&mut self, interval: Duration) -> Ask {
+        let by_group = match &mut self.way {
+            Way::MessageInterval => false,
+            Way::Either { data_stream_next } => std::mem::replace(data_stream_next, !*data_stream_next),
+            Way::DataStream => true,
+        };
+        match self.group().filter(|_| by_group) {
+            Some(group) => Ask::DataStream { group, rate_hz: (1.0 / interval.as_secs_f64()).round().max(1.0) as u16 },
+            None => Ask::MessageInterval { message_id: self.message_id, interval },
         }
     }
 
     fn due(&self, since: Timestamp) -> Option<Timestamp> {
-        if self.refused {
+        if self.refused && self.way != Way::DataStream {
             return None;
         }
         let missing = self.seen.unwrap_or(since) + MISSING_AFTER;

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use super::intervals::Schedule;
 use super::messages::Interval;
-use super::{ATTITUDE_STALE, DeviceState, GimbalManager, ManagerOutput, Surroundings};
+use super::{ATTITUDE_STALE, GimbalManager, ManagerOutput, Surroundings};
 use crate::channel::ChannelId;
 use crate::geometry::{Angle, YawFrame};
 use crate::timestamp::Timestamp;
@@ -104,7 +104,7 @@ impl GimbalManager {
     }
 
     fn looks(&self, now: Timestamp, around: Surroundings<'_>) -> Option<Looks> {
-        let (at, status) = self.status.filter(|_| self.state == DeviceState::Alive)?;
+        let (at, status) = self.status?;
         if now.since(at) > ATTITUDE_STALE {
             return None;
         }

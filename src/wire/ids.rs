@@ -51,6 +51,7 @@ pub mod message {
     pub const ATTITUDE_QUATERNION: u32 = 31;
     pub const LOCAL_POSITION_NED: u32 = 32;
     pub const GLOBAL_POSITION_INT: u32 = 33;
+    pub const REQUEST_DATA_STREAM: u32 = 66;
     pub const MANUAL_CONTROL: u32 = 69;
     pub const COMMAND_INT: u32 = 75;
     pub const COMMAND_LONG: u32 = 76;
@@ -212,6 +213,7 @@ pub mod severity {
 
 /// `MAV_DATA_STREAM`.
 pub mod mav_data_stream {
+    pub const ALL: u8 = 0;
     pub const POSITION: u8 = 6;
     pub const EXTRA1: u8 = 10;
 }

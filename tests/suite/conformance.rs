@@ -7,6 +7,7 @@ mod discovery;
 mod gimbals;
 mod identity;
 mod manager;
+mod mavlink_v1;
 mod mavsdk_trace;
 mod own_commands;
 mod presented_device;

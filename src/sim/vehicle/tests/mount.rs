@@ -104,6 +104,8 @@ fn it_looks_for_a_gimbal_for_a_minute() {
 }
 
 /// "Control (observed at the device, Gremsy)", and what a request for each message is answered.
+/// Gimbal statement 48: "ArduPilot-as-manager: command 1000 with only pitch finite is reported FAILED by the ArduPilot
+/// emulation."
 #[test]
 #[rustfmt::skip]
 fn it_obeys_as_observed() {
