@@ -1,8 +1,9 @@
 //! Finds out what a gimbal speaks, where the configuration leaves that open (`family = "auto"`).
 //!
 //! Every gimbal is taken for a v2 device at first, and asked who it is for ever, as the Gimbal Protocol v2 has it. One that
-//! gives no sign of being one is taken for a v1 gimbal: soon when it tells where it looks by a message of v1, late when it
-//! sends nothing but heartbeats. One that says that Gremsy made it is driven as a Gremsy. Nothing of this moves it. Whenever a sign of v2 comes after all, it is a v2 device again.
+//! says it is a Gremsy's is driven as one. One that gives no sign of being a v2 device is asked for parameters that only a
+//! Gremsy has, and otherwise taken for a v1 gimbal: soon when it tells where it looks by a message of v1, late when it sends
+//! nothing but heartbeats. Nothing of this moves it. Whenever a sign of v2 comes after all, it is a v2 device again.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -11,6 +12,7 @@ use super::details::GimbalDetails;
 use super::driver::{CommandOutcome, DriverOutput, GimbalDriver};
 use super::families;
 use super::gremsy;
+use super::gremsy::parameters::ParameterTable;
 use super::mavlink_v2::{MavlinkV2Driver, packet};
 use super::operation::{Operation, OperationId};
 use super::report::Report;
@@ -18,7 +20,7 @@ use super::setpoint::Setpoint;
 use super::settings::{Family, GimbalSettings};
 use crate::timers::TimerTable;
 use crate::timestamp::Timestamp;
-use crate::wire::dialect::COMMAND_LONG_DATA;
+use crate::wire::dialect::{COMMAND_LONG_DATA, CharArray, MavMessage, PARAM_REQUEST_READ_DATA, PARAM_VALUE_DATA};
 use crate::wire::ids::message;
 use crate::wire::{Frame, MavId};
 
@@ -27,6 +29,13 @@ pub const V1_BY_ITS_ATTITUDE_AFTER: Duration = Duration::from_secs(5);
 
 /// So is one that sends nothing but heartbeats for so long; a v2 device may take 15 s to start.
 pub const V1_BY_ITS_SILENCE_AFTER: Duration = Duration::from_secs(20);
+
+/// A gimbal that gives no sign of v2 for so long is asked for parameters of certain makes …
+const ASK_PARAMETERS_AFTER: Duration = Duration::from_secs(2);
+/// … so often …
+const PARAMETER_QUESTIONS: u8 = 3;
+/// … at this interval.
+const ASK_PARAMETERS_EVERY: Duration = Duration::from_secs(1);
 
 /// Stands in front of the driver of whatever family it turns out to be.
 #[derive(Debug)]
@@ -49,10 +58,14 @@ pub struct Detection {
 struct Evidence {
     v2: bool,
     v1_attitude: bool,
+    /// How often it was asked for parameters.
+    questions: u8,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Timer {
+    /// When to ask for parameters.
+    AskParameters,
     /// When to do without v2, if it tells its attitude by v1.
     JudgeByAttitude,
     /// When to do without v2 in any case.
@@ -84,9 +97,8 @@ impl Detection {
     fn take(&mut self, now: Timestamp, family: Family) {
         let Some(device) = self.device.filter(|_| self.family() != family) else { return };
         tracing::info!(%device, family = family.name(), "the gimbal's family is known");
-        self.timers.cancel(Timer::JudgeByAttitude);
-        self.timers.cancel(Timer::JudgeBySilence);
-        // Which of its protocols a Gremsy speaks is for its driver to find out.
+        self.stop_judging();
+        // A Gremsy may be either, and says which.
         if family != Family::Gremsy {
             self.outputs.push_back(DriverOutput::Report(Report::SpeaksForItself(family == Family::MavlinkV2)));
         }
@@ -104,27 +116,51 @@ impl Detection {
 
     /// Notes what a frame of the device says of its family.
     fn weigh(&mut self, now: Timestamp, frame: &Frame<'_>) {
+        // One of these speaks both v1 and v2.
+        if self.family() == Family::Gremsy {
+            return;
+        }
         match frame.message_id() {
             message::HEARTBEAT if !self.is_reported && self.other.is_none() && !self.evidence.v2 => {
+                self.evidence.questions = 0;
+                self.timers.set(Timer::AskParameters, now + ASK_PARAMETERS_AFTER);
                 self.timers.set(Timer::JudgeByAttitude, now + V1_BY_ITS_ATTITUDE_AFTER);
                 self.timers.set(Timer::JudgeBySilence, now + V1_BY_ITS_SILENCE_AFTER);
             }
-            message::GIMBAL_DEVICE_INFORMATION if is_of_gremsy(frame) => {
-                self.evidence.v2 = true;
-                self.take(now, Family::Gremsy);
-            }
-            message::GIMBAL_DEVICE_INFORMATION | message::GIMBAL_DEVICE_ATTITUDE_STATUS
-                if self.family() == Family::Gremsy => {}
+            message::PARAM_VALUE if is_parameter_of_gremsy(frame) => self.take(now, Family::Gremsy),
+            message::GIMBAL_DEVICE_INFORMATION if is_of_gremsy(frame) => self.take(now, Family::Gremsy),
             message::GIMBAL_DEVICE_INFORMATION | message::GIMBAL_DEVICE_ATTITUDE_STATUS
                 if (!self.evidence.v2 || self.other.is_some()) && is_of_v2(frame) =>
             {
                 self.evidence.v2 = true;
-                self.timers.cancel(Timer::JudgeByAttitude);
-                self.timers.cancel(Timer::JudgeBySilence);
+                self.stop_judging();
                 self.take(now, Family::MavlinkV2);
             }
             message::MOUNT_ORIENTATION | message::MOUNT_STATUS => self.evidence.v1_attitude = true,
             _ => {}
+        }
+    }
+
+    fn stop_judging(&mut self) {
+        for timer in [Timer::AskParameters, Timer::JudgeByAttitude, Timer::JudgeBySilence] {
+            self.timers.cancel(timer);
+        }
+    }
+
+    fn ask_parameters(&mut self, now: Timestamp) {
+        let Some(device) = self.device else { return };
+        for name in ParameterTable::TELLING_NAMES {
+            let question = MavMessage::PARAM_REQUEST_READ(PARAM_REQUEST_READ_DATA {
+                param_index: -1,
+                target_system: device.system,
+                target_component: device.component,
+                param_id: CharArray::from(name),
+            });
+            self.outputs.push_back(DriverOutput::Message(Box::new(question)));
+        }
+        self.evidence.questions += 1;
+        if self.evidence.questions < PARAMETER_QUESTIONS {
+            self.timers.set(Timer::AskParameters, now + ASK_PARAMETERS_EVERY);
         }
     }
 
@@ -140,8 +176,7 @@ impl Detection {
                 }
                 DriverOutput::Report(Report::Lost) => {
                     self.is_reported = false;
-                    self.timers.cancel(Timer::JudgeByAttitude);
-                    self.timers.cancel(Timer::JudgeBySilence);
+                    self.stop_judging();
                     self.outputs.push_back(output);
                 }
                 output => self.outputs.push_back(output),
@@ -174,7 +209,9 @@ impl GimbalDriver for Detection {
             return;
         }
         self.weigh(now, frame);
-        self.v2.handle_received(now, frame);
+        if self.family() != Family::Gremsy {
+            self.v2.handle_received(now, frame);
+        }
         if let Some(other) = &mut self.other {
             other.handle_received(now, frame);
         }
@@ -205,12 +242,15 @@ impl GimbalDriver for Detection {
     }
 
     fn handle_timeout(&mut self, now: Timestamp) {
-        self.v2.handle_timeout(now);
+        if self.family() != Family::Gremsy {
+            self.v2.handle_timeout(now);
+        }
         if let Some(other) = &mut self.other {
             other.handle_timeout(now);
         }
         while let Some(timer) = self.timers.pop_due(now) {
             match timer {
+                Timer::AskParameters => self.ask_parameters(now),
                 Timer::JudgeByAttitude if self.evidence.v1_attitude => self.take(now, Family::MavlinkV1),
                 Timer::JudgeByAttitude => {}
                 Timer::JudgeBySilence => self.take(now, Family::MavlinkV1),
@@ -226,7 +266,8 @@ impl GimbalDriver for Detection {
     fn poll_timeout(&self) -> Option<Timestamp> {
         let other = self.other.as_ref().and_then(|other| other.poll_timeout());
         let timer = self.timers.next().map(|(at, _)| at);
-        [self.v2.poll_timeout(), other, timer].into_iter().flatten().min()
+        let v2 = self.v2.poll_timeout().filter(|_| self.family() != Family::Gremsy);
+        [v2, other, timer].into_iter().flatten().min()
     }
 
     fn details(&self, now: Timestamp) -> GimbalDetails {
@@ -234,10 +275,17 @@ impl GimbalDriver for Detection {
     }
 }
 
-/// Whether a gimbal says that it is made by Gremsy, which has commands and modes of its own.
+/// Whether a v2 device says that Gremsy made it.
 fn is_of_gremsy(frame: &Frame<'_>) -> bool {
-    packet::read_information(frame)
-        .is_some_and(|information| information.gimbal_device_id == 0 && gremsy::is_vendor(&information.identity.vendor))
+    let information = packet::read_information(frame).filter(|information| information.gimbal_device_id == 0);
+    information.is_some_and(|information| gremsy::is_vendor(&information.identity.vendor))
+}
+
+/// Whether only a Gremsy has the parameter.
+fn is_parameter_of_gremsy(frame: &Frame<'_>) -> bool {
+    let value = frame.decode::<PARAM_VALUE_DATA>();
+    let name = value.as_ref().and_then(|value| value.param_id.to_str().ok());
+    ParameterTable::recognised_by(name).is_some()
 }
 
 /// Whether only a v2 device says that of itself.

@@ -4,6 +4,8 @@ use std::time::Duration;
 
 use gimbald::geometry::Angle;
 use gimbald::gimbals::detection::{V1_BY_ITS_ATTITUDE_AFTER, V1_BY_ITS_SILENCE_AFTER};
+use gimbald::gimbals::gremsy::sim as gremsy;
+use gimbald::gimbals::gremsy::version::FirmwareVersion;
 use gimbald::gimbals::mavlink_v1::sim::{Device, DeviceSettings, Feedback};
 use gimbald::sim::plant::PlantSettings;
 use gimbald::sim::vehicle::{Vehicle, VehicleSettings};
@@ -136,4 +138,44 @@ fn what_was_found_out_is_kept_when_the_gimbal_comes_back() {
     run(&mut world, places, 2 * SECOND);
 
     assert_eq!((family(&world).as_str(), world.snapshot().gimbals[0].state.as_str()), ("mavlink_v1", "alive"));
+}
+
+/// A Gremsy of the v1 generation, asked for parameters because it says nothing of v2; its firmware may be so old that it
+/// does not answer 283.
+#[test]
+fn a_gremsy_of_the_first_generation_is_known_by_its_parameters() {
+    for (firmware, generation) in [((7, 7, 3), "v1"), ((7, 5, 6), "v1")] {
+        let (x, y, z) = firmware;
+        let settings = gremsy::DeviceSettings {
+            firmware: FirmwareVersion::official(x, y, z),
+            ..gremsy::DeviceSettings::of(gremsy::Generation::V1)
+        };
+        let (mut world, places) = World::empty(three_links());
+        world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
+        world.install(places.gimbal, gremsy::Device::new(Timestamp::ZERO, settings));
+
+        run(&mut world, places, 40 * SECOND);
+
+        let gimbal = world.snapshot().gimbals.remove(0);
+        assert_eq!((gimbal.family.as_str(), gimbal.details.generation.as_deref()), ("gremsy", Some(generation)));
+        assert_eq!((gimbal.state.as_str(), gimbal.device_id), ("alive", Some(1)), "{firmware:?}");
+        assert_eq!(mount_commands(&mut world, places), [], "nobody has asked for anything");
+    }
+}
+
+/// One of the v2 generation says who made it, and speaks for itself.
+#[test]
+fn a_gremsy_of_the_second_generation_is_known_by_its_name() {
+    let (mut world, places) = World::empty(three_links());
+    world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
+    let settings = gremsy::DeviceSettings::of(gremsy::Generation::V2);
+    world.install(places.gimbal, gremsy::Device::new(Timestamp::ZERO, settings));
+
+    run(&mut world, places, 30 * SECOND);
+
+    let gimbal = world.snapshot().gimbals.remove(0);
+    assert_eq!((gimbal.family.as_str(), gimbal.details.generation.as_deref()), ("gremsy", Some("v2")));
+    assert_eq!((gimbal.state.as_str(), gimbal.device_id), ("alive", Some(154)));
+    let heard = from_manager(world.take(places.ground));
+    assert!(of::<GIMBAL_DEVICE_ATTITUDE_STATUS_DATA>(&heard).is_empty(), "it speaks for itself");
 }
