@@ -4,6 +4,8 @@
 mod fields;
 mod table;
 
+use std::fmt;
+
 use serde_json::{Map, Value};
 
 use crate::gimbals::operation::{Motors, Operation, Restart};
@@ -25,6 +27,12 @@ pub struct Action {
     /// The word without which it is not done, where it is dangerous.
     pub word: Option<&'static str>,
     read: fn(&Values) -> Result<Asked, Wrong>,
+}
+
+impl fmt::Debug for Action {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Action({})", self.command)
+    }
 }
 
 impl Action {

@@ -1,5 +1,7 @@
 //! The command line: every command with its arguments and its help.
 
+pub mod order;
+
 use std::ffi::OsString;
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -37,12 +39,13 @@ Examples:
   gimbald check --config ./gimbald.toml          is the configuration right?
   gimbald run --config ./gimbald.toml --log debug
   gimbald status --watch                         what is the running daemon doing?
+  gimbald gimbal camera point --pitch-deg -30    ask something of a gimbal
 
-Exit codes: 0 done, 64 wrong arguments, 69 something needed is not there, 78 wrong configuration."
+Exit codes: 0 done, 64 wrong arguments, 69 something needed is not there, 77 not allowed, 78 wrong configuration."
 )]
 pub struct Cli {
     /// What to log: error, warn, info, debug, trace, or by module as in 'info,gimbald::links=debug'
-    #[arg(long, global = true, value_name = "FILTER", default_value = "info")]
+    #[arg(long, global = true, display_order = 101, value_name = "FILTER", default_value = "info")]
     pub log: LogFilter,
 
     #[command(subcommand)]
@@ -95,6 +98,31 @@ Examples:
 
 Exit codes: 0 when the daemon answered, 69 when not.")]
     Status(StatusArgs),
+
+    /// Show a gimbal by its name, or ask something of it
+    #[command(
+        subcommand_value_name = "COMMAND",
+        after_help = "\
+Examples:
+  gimbald gimbal camera                          how is it?
+  gimbald gimbal camera control take
+  gimbald gimbal camera point --pitch-deg -30 --yaw-deg 20
+  gimbald gimbal camera turn --yaw-dps 10 --for 3
+  gimbald gimbal camera stop
+  gimbald gimbal camera roi 47.3977 8.5456 430
+  gimbald gimbal camera parameters
+  gimbald gimbal camera set-parameter PWR_PAN 60
+  gimbald gimbal camera motors off --yes-motors-off
+  gimbald gimbal camera reboot --yes-reboot
+
+All but showing needs the token of [http] token_file. It is looked for in --token-file, else in the file that
+GIMBALD__HTTP__TOKEN_FILE or the configuration names. Whoever asks takes part in control as 'http'; who asks for nothing
+for lease_timeout_s loses it. What can cost the camera or the flight (motors off, reboot, shutdown) needs its --yes-… and
+control, taken before.
+Exit codes: 0 done, 64 wrong arguments or no such gimbal, 69 the daemon or the gimbal is not there or cannot, 77 no token, a
+wrong one, or somebody else is in control, 78 the token file holds no token."
+    )]
+    Gimbal(GimbalArgs),
 
     /// Find out which serial device, baud rate and gimbal family answer
     #[command(after_help = "\
@@ -297,6 +325,32 @@ pub struct StatusArgs {
     /// Print the daemon's JSON as it is
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct GimbalArgs {
+    /// The gimbal, as it is called in the status
+    #[arg(value_name = "NAME")]
+    pub name: String,
+
+    /// Where the daemon's page is
+    #[arg(long, global = true, display_order = 100, value_name = "URL", default_value_t = format!("http://{}", HttpSettings::DEFAULT_LISTEN))]
+    pub url: String,
+
+    /// The file with the token of those who may control gimbals
+    #[arg(long, global = true, display_order = 100, value_name = "FILE")]
+    pub token_file: Option<PathBuf>,
+
+    /// The configuration that names it otherwise
+    #[arg(long, global = true, display_order = 100, value_name = "FILE", default_value = DEFAULT_FILE)]
+    pub config: PathBuf,
+
+    /// Print the daemon's JSON as it is
+    #[arg(long, global = true, display_order = 100)]
+    pub json: bool,
+
+    #[command(subcommand)]
+    pub order: Option<order::Order>,
 }
 
 #[derive(Debug, Args)]

@@ -1,7 +1,9 @@
 //! One module for each command: what it does with its arguments, and how it ends.
 
 pub mod check;
+mod client;
 pub mod demo;
+pub mod gimbal;
 pub mod run;
 pub mod scan;
 pub mod sim;

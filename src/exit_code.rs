@@ -8,6 +8,8 @@ pub enum ExitCode {
     Usage,
     /// Something the command needs is not there (EX_UNAVAILABLE).
     Unavailable,
+    /// Somebody has to allow it first (EX_NOPERM).
+    NoPermission,
     /// The configuration is wrong or missing (EX_CONFIG).
     Config,
 }
@@ -18,6 +20,7 @@ impl ExitCode {
             Self::Ok => 0,
             Self::Usage => 64,
             Self::Unavailable => 69,
+            Self::NoPermission => 77,
             Self::Config => 78,
         }
     }

@@ -18,6 +18,7 @@ fn main() -> process::ExitCode {
         Command::Demo(arguments) => commands::demo::demo(&arguments, &mut io::stdout(), &mut io::stderr()),
         Command::Sim(command) => commands::sim::sim(&command, &mut io::stderr()),
         Command::Status(arguments) => commands::status::status(&arguments, &mut io::stderr()),
+        Command::Gimbal(arguments) => commands::gimbal::gimbal(&arguments, &mut io::stdout(), &mut io::stderr()),
         Command::Scan(arguments) => commands::scan::scan(&arguments, &mut io::stdout(), &mut io::stderr()),
     }
     .into()

@@ -14,7 +14,8 @@ use tokio_serial::{ClearBuffer, SerialPort, SerialStream};
 
 use self::conversation::{Conversation, Party};
 use self::ports::{Port, PortError};
-use super::status::{self, StatusError};
+use super::client::{ClientError, printable_text};
+use super::status;
 use crate::bridge::settings::Role;
 use crate::bridge::snapshot::{GimbalSnapshot, LinkSnapshot};
 use crate::cli::ScanArgs;
@@ -106,7 +107,7 @@ fn run(device: Option<&Path>, daemon: &str, output: &mut impl Write, errors: &mu
 async fn held_by_daemon(url: &str, errors: &mut impl Write) -> Vec<Held> {
     match status::snapshot(url).await {
         Ok(snapshot) => snapshot.links.iter().filter_map(|link| Held::of_link(link, &snapshot.gimbals)).collect(),
-        Err(StatusError::Unreachable { .. }) => Vec::new(),
+        Err(ClientError::Unreachable { .. }) => Vec::new(),
         Err(error) => {
             say(errors, format_args!("which ports a running gimbald has cannot be asked ({error}); locks tell"));
             Vec::new()
@@ -139,7 +140,7 @@ impl Held {
 
 impl fmt::Display for Held {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {} baud, {}", self.path, self.baud, status::printable_text(&self.state))?;
+        write!(f, "{}: {} baud, {}", self.path, self.baud, printable_text(&self.state))?;
         for gimbal in &self.gimbals {
             let generation = gimbal.details.generation.iter();
             let product = [&gimbal.vendor, &gimbal.model].into_iter().flatten();
@@ -148,7 +149,7 @@ impl fmt::Display for Held {
             let told = product.cloned().chain(firmware).chain([gimbal.state.clone()]);
             let told = [family.join(" ")].into_iter().chain(told).collect::<Vec<_>>().join(", ");
             let device = gimbal.device.as_deref().unwrap_or_default();
-            write!(f, "\n  {}: {}", status::printable_text(device), status::printable_text(&told))?;
+            write!(f, "\n  {}: {}", printable_text(device), printable_text(&told))?;
         }
         Ok(())
     }
@@ -274,7 +275,7 @@ impl fmt::Display for Party {
         let Some(identity) = &self.identity else { return write!(f, ", which does not tell its make") };
         for name in [&identity.vendor, &identity.model, &identity.custom_name] {
             if !name.is_empty() {
-                write!(f, ", {}", status::printable_text(name))?;
+                write!(f, ", {}", printable_text(name))?;
             }
         }
         match identity.firmware {

@@ -9,7 +9,7 @@ const PAGE: &str = include_str!("page.html");
 /// name that a gimbal reports became markup, it could neither run nor load anything.
 const POLICY: &str = "default-src 'none'; \
     style-src 'sha256-qktgxO7X3SOGDQ7Tmtw4zR4SqhIYleK/DYmiXfhYbQE='; \
-    script-src 'sha256-fH5rn+xk5gDaoSQj4rXc9QP4Sa/uHPScQUB0FxMN4tw='; \
+    script-src 'sha256-qEFPY3idj9nTlQYNxGEyGT9Pk1JyvIpyAplW7bzCBW8='; \
     connect-src 'self'; img-src data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 pub async fn page() -> impl IntoResponse {

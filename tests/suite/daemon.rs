@@ -2,6 +2,7 @@
 //!
 //! The only tests in real time: every wait has a condition and a deadline.
 
+mod control;
 mod endings;
 mod garbage;
 mod load;

@@ -47,6 +47,13 @@ pub fn report(snapshot: &Snapshot) -> String {
     out.0
 }
 
+/// One gimbal, for a person.
+pub fn gimbal_report(gimbal: &GimbalSnapshot) -> String {
+    let mut out = Lines::default();
+    self::gimbal(&mut out, gimbal);
+    out.0.trim_start().to_owned()
+}
+
 fn links(out: &mut Lines, links: &[LinkSnapshot]) {
     if links.is_empty() {
         return out.line(1, "none is configured");
@@ -159,6 +166,9 @@ fn gimbal(out: &mut Lines, gimbal: &GimbalSnapshot) {
     if let Some(roi) = &gimbal.roi {
         let place = place(Some(roi.latitude_deg), Some(roi.longitude_deg));
         out.fact("roi", &format!("{place}  {}", altitude(Some(roi.altitude_amsl_m))));
+    }
+    for fault in &gimbal.details.faults {
+        out.fact("fault", fault);
     }
     out.fact_unless_empty("failures", &gimbal.failure_flags.join(" "));
     out.fact_unless_empty("flags", &gimbal.flags.join(" "));
@@ -324,6 +334,7 @@ gimbal camera  alive  mavlink_v2  device 1/154  manager 191
   setpoint  angle  pitch -45.0°  yaw 120.0° from North  by 255/190
   autopilot sees it as 1/154, asks for nothing new
   roi       47.400000° 8.550000°  430.0 m above mean sea level
+  fault     firmware 7.8.7 reports a wrong yaw from North
   failures  motor_error
   flags     yaw_lock roll_lock
   refused   1/100: not_in_control 12

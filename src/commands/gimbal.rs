@@ -1,0 +1,160 @@
+//! `gimbald gimbal NAME …`: shows a gimbal, or asks something of it, through a running daemon.
+
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use serde_json::Value;
+use tokio::time::{Instant, sleep_until};
+
+use super::client::{ClientError, Target, printable, printable_text};
+use super::status::text;
+use crate::actions::percent_encoded;
+use crate::bridge::snapshot::GimbalSnapshot;
+use crate::cli::GimbalArgs;
+use crate::cli::order::{Act, Order};
+use crate::exit_code::ExitCode;
+use crate::token::{Token, TokenError};
+
+/// Between two requests to turn on; well below the shortest sensible `rate_timeout_s`.
+const REFRESH: Duration = Duration::from_millis(400);
+
+/// Says where the token is, as the daemon's own variable does.
+const TOKEN_VARIABLE: &str = "GIMBALD__HTTP__TOKEN_FILE";
+
+/// Why it could not be shown, or was not done.
+#[derive(Debug, thiserror::Error)]
+enum GimbalError {
+    #[error(transparent)]
+    Client(#[from] ClientError),
+    #[error("control needs the token: name its file with --token-file, or in [http] token_file of {}", .0.display())]
+    NoToken(PathBuf),
+    #[error("the token file {} {error}", path.display())]
+    Token { path: PathBuf, error: TokenError },
+}
+
+impl GimbalError {
+    fn exit_code(&self) -> ExitCode {
+        match self {
+            Self::Client(error) => error.exit_code(),
+            Self::NoToken(_) => ExitCode::NoPermission,
+            Self::Token { error: TokenError::Unreadable(error), .. }
+                if error.kind() == io::ErrorKind::PermissionDenied =>
+            {
+                ExitCode::NoPermission
+            }
+            Self::Token { .. } => ExitCode::Config,
+        }
+    }
+}
+
+/// Prints what was to be shown or what became of what was asked, and to `errors` why not.
+pub fn gimbal(arguments: &GimbalArgs, output: &mut impl Write, errors: &mut impl Write) -> ExitCode {
+    match run(arguments, output) {
+        Ok(()) => ExitCode::Ok,
+        // `gimbald gimbal camera | head` has seen enough.
+        Err(GimbalError::Client(ClientError::Output(error))) if error.kind() == io::ErrorKind::BrokenPipe => {
+            ExitCode::Ok
+        }
+        Err(error) => {
+            // The exit code says it too; nobody is left to tell when the reader is gone.
+            let _ = writeln!(errors, "gimbald: {error}");
+            error.exit_code()
+        }
+    }
+}
+
+fn run(arguments: &GimbalArgs, output: &mut impl Write) -> Result<(), GimbalError> {
+    let target = Target::parse(&arguments.url)?;
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(ClientError::Output)?;
+    let result = runtime.block_on(async {
+        let of_gimbal = format!("/gimbals/{}", percent_encoded(&arguments.name));
+        match &arguments.order {
+            None => show(&target, &of_gimbal, arguments.json).await,
+            Some(Order::Parameters { name }) => parameters(&target, &of_gimbal, name.as_deref(), arguments.json).await,
+            Some(Order::Act(act)) => {
+                let token = token(arguments)?;
+                let answer = carry_out(&target, &of_gimbal, act, &token).await?;
+                Ok(if arguments.json {
+                    as_it_is(&answer)
+                } else {
+                    format!("{}: {} done\n", printable_text(&arguments.name), act.action.command)
+                })
+            }
+        }
+    });
+    // A name that is still being resolved must not keep the command from ending.
+    runtime.shutdown_background();
+    output.write_all(result?.as_bytes()).and_then(|()| output.flush()).map_err(ClientError::Output)?;
+    Ok(())
+}
+
+async fn show(target: &Target, of_gimbal: &str, json: bool) -> Result<String, GimbalError> {
+    let answer = target.get(of_gimbal).await?;
+    if json {
+        return Ok(as_it_is(&answer));
+    }
+    let value: Value = serde_json::from_slice(&answer).map_err(|error| target.not_gimbald(error))?;
+    let gimbal: GimbalSnapshot = serde_json::from_value(printable(value)).map_err(|error| target.not_gimbald(error))?;
+    Ok(text::gimbal_report(&gimbal))
+}
+
+async fn parameters(target: &Target, of_gimbal: &str, name: Option<&str>, json: bool) -> Result<String, GimbalError> {
+    let one = name.map(|name| format!("/{}", percent_encoded(name))).unwrap_or_default();
+    let answer = target.get(&format!("{of_gimbal}/parameters{one}")).await?;
+    if json {
+        return Ok(as_it_is(&answer));
+    }
+    let value: Value = serde_json::from_slice(&answer).map_err(|error| target.not_gimbald(error))?;
+    match (name, printable(value)) {
+        (Some(_), Value::Object(parameter)) => Ok(format!("{}\n", parameter.get("value").unwrap_or(&Value::Null))),
+        (None, Value::Object(all)) if all.is_empty() => Ok("none was read\n".to_owned()),
+        (None, Value::Object(all)) => Ok(all.iter().map(|(name, value)| format!("{name:<16} {value}\n")).collect()),
+        (_, other) => Err(target.not_gimbald(other).into()),
+    }
+}
+
+/// Asks for it once, or as long as it is to last; then, and at Ctrl-C, what turns is stopped.
+async fn carry_out(target: &Target, of_gimbal: &str, act: &Act, token: &Token) -> Result<Vec<u8>, GimbalError> {
+    let path = format!("{of_gimbal}/{}", act.action.path_with(act.in_path.as_deref()));
+    let mut answer = target.post(&path, token, act.body.clone()).await?;
+    let Some(lasting) = act.lasting else { return Ok(answer) };
+    let end = Instant::now() + lasting;
+    let turning = async {
+        let mut next = end - lasting + REFRESH;
+        while next < end {
+            sleep_until(next).await;
+            answer = target.post(&path, token, act.body.clone()).await?;
+            next += REFRESH;
+        }
+        sleep_until(end).await;
+        Ok::<(), ClientError>(())
+    };
+    let turned = tokio::select! {
+        turned = turning => turned,
+        // Whether it came or cannot be waited for: it is not to turn on.
+        _ = tokio::signal::ctrl_c() => Ok(()),
+    };
+    let stopped = target.post(&format!("{of_gimbal}/stop"), token, Vec::new()).await;
+    turned?;
+    stopped?;
+    Ok(answer)
+}
+
+fn as_it_is(answer: &[u8]) -> String {
+    format!("{}\n", String::from_utf8_lossy(answer))
+}
+
+fn token(arguments: &GimbalArgs) -> Result<Token, GimbalError> {
+    let from_variable = || std::env::var_os(TOKEN_VARIABLE).map(PathBuf::from);
+    let path = arguments.token_file.clone().or_else(from_variable).or_else(|| configured(&arguments.config));
+    let path = path.ok_or_else(|| GimbalError::NoToken(arguments.config.clone()))?;
+    Token::read(&path).map_err(|error| GimbalError::Token { path, error })
+}
+
+/// What the configuration says; whether the rest of it is right is not asked here.
+fn configured(path: &Path) -> Option<PathBuf> {
+    let text = std::fs::read_to_string(path).ok()?; // none there, or none for us
+    let table: toml::Table = text.parse().ok()?; // `gimbald check` says what is wrong with it
+    table.get("http")?.get("token_file")?.as_str().map(PathBuf::from)
+}
