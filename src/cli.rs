@@ -133,8 +133,9 @@ Examples:
 A port that a running 'gimbald run' or another program holds is left alone; a running gimbald is asked what is there. On
 the others every usual baud rate is tried for about 2.5 seconds, so a port where nobody answers takes 20 seconds. A gimbal
 may be silent until it hears somebody, so HEARTBEAT is sent (from system 1, component 191, as onboard controller and as
-a vehicle of no kind, in turn), whoever was heard is asked for GIMBAL_DEVICE_INFORMATION, and gimbals that do not answer
-for parameters of certain makes. Nothing is sent that moves anything.
+a vehicle of no kind, in turn), whoever was heard is asked for GIMBAL_DEVICE_INFORMATION, gimbals that do not answer for
+parameters of certain makes, and a Gremsy for GIMBAL_DEVICE_ATTITUDE_STATUS ten times a second. Nothing is sent that
+moves anything.
 Exit codes: 0 when something answered, 69 when not, 64 for a DEVICE that is no serial port.")]
     Scan(ScanArgs),
 }

@@ -31,6 +31,8 @@ const INTRODUCTION: Duration = Duration::from_millis(2_500);
 /// How long others on the line have to show themselves when a gimbal has told what it is.
 const OTHERS: Duration = Duration::from_millis(1_100);
 /// Each kind of heartbeat once a second.
+/// How often a Gremsy is asked to tell where it looks, until it is switched off.
+const STATUS_INTERVAL: Duration = Duration::from_millis(100);
 const HEARTBEAT_INTERVAL: Duration = Duration::from_millis(500);
 const REQUEST_INTERVAL: Duration = Duration::from_millis(500);
 
@@ -60,6 +62,8 @@ pub struct Party {
     /// 283 or 285 about itself was heard from it.
     pub is_gimbal_device: bool,
     pub identity: Option<Identity>,
+    /// It told where it looks by 285.
+    tells_v2_attitude: bool,
     /// It told where it looks by a message of v1.
     tells_v1_attitude: bool,
     /// Which of the parameters it has that only Gremsy gimbals have.
@@ -87,12 +91,16 @@ impl Party {
         self.heartbeat.is_some_and(|(kind, _)| kind == mav_type::GIMBAL)
     }
 
+    fn is_gremsy(&self) -> bool {
+        self.table.is_some() || self.identity.as_ref().is_some_and(|identity| gremsy::is_vendor(&identity.vendor))
+    }
+
     /// What it speaks, and which generation of that.
     pub fn speaks(&self) -> &'static str {
-        let is_gremsy = self.identity.as_ref().is_some_and(|identity| gremsy::is_vendor(&identity.vendor));
-        match (is_gremsy || self.table.is_some(), self.is_gimbal_device) {
-            (true, true) => "gremsy v2",
-            (true, false) => "gremsy v1",
+        match (self.is_gremsy(), self.is_gimbal_device) {
+            // Both generations say who they are.
+            (true, _) if self.tells_v2_attitude => "gremsy v2",
+            (true, _) => "gremsy v1",
             (false, true) => Family::MavlinkV2.name(),
             (false, false) => Family::MavlinkV1.name(),
         }
@@ -147,6 +155,7 @@ impl Conversation {
             self.request_at = Some(now + REQUEST_INTERVAL);
             self.send(&packet::request_message(Target::Everyone, message::GIMBAL_DEVICE_INFORMATION));
             self.ask_parameters();
+            self.ask_generation();
         }
     }
 
@@ -196,6 +205,16 @@ impl Conversation {
         }
     }
 
+    /// Asks a Gremsy for 285, which only the second generation has and which some models send only when asked.
+    fn ask_generation(&mut self) {
+        let unknown = |party: &Party| party.is_gremsy() && !party.tells_v2_attitude;
+        let asked: Vec<MavId> = self.parties.iter().filter(|(_, party)| unknown(party)).map(|(id, _)| *id).collect();
+        for device in asked {
+            let status = message::GIMBAL_DEVICE_ATTITUDE_STATUS;
+            self.send(&MavMessage::COMMAND_LONG(packet::set_message_interval(device, status, STATUS_INTERVAL)));
+        }
+    }
+
     fn note(&mut self, now: Timestamp, frame: &Frame<'_>) {
         if self.request_at.is_none() {
             self.request_at = Some(now);
@@ -207,14 +226,16 @@ impl Conversation {
             party.heartbeat = Some((heartbeat.mavtype, heartbeat.autopilot));
         }
         if let Some(information) = packet::read_information(frame) {
-            if party.identity.is_none() {
+            let is_first = party.identity.is_none();
+            party.identity = Some(information.identity);
+            if is_first && (!party.is_gremsy() || party.tells_v2_attitude) {
                 self.ends_at = self.ends_at.min(now + OTHERS);
             }
-            party.identity = Some(information.identity);
         }
         match frame.message_id() {
             message::GIMBAL_DEVICE_INFORMATION | message::GIMBAL_DEVICE_ATTITUDE_STATUS => {
                 party.is_gimbal_device = true;
+                party.tells_v2_attitude |= frame.message_id() == message::GIMBAL_DEVICE_ATTITUDE_STATUS;
             }
             message::MOUNT_ORIENTATION | message::MOUNT_STATUS => party.tells_v1_attitude = true,
             message::PARAM_VALUE => {
@@ -249,8 +270,11 @@ mod tests {
     type Sent = Vec<(Timestamp, Vec<u8>)>;
 
     /// Runs a conversation with `peer` to its end: when that was, who was there, and what was sent when.
-    fn run(mut peer: impl Peer) -> (Timestamp, BTreeMap<MavId, Party>, Sent) {
-        let mut now = Timestamp::ZERO;
+    fn run(peer: impl Peer) -> (Timestamp, BTreeMap<MavId, Party>, Sent) {
+        run_from(Timestamp::ZERO, peer)
+    }
+
+    fn run_from(mut now: Timestamp, mut peer: impl Peer) -> (Timestamp, BTreeMap<MavId, Party>, Sent) {
         let mut conversation = Conversation::new(now, 115_200);
         let mut sent = Sent::new();
         loop {
@@ -341,6 +365,27 @@ mod tests {
             assert!(party.is_gimbal() && !party.is_gimbal_device);
             assert_eq!((party.speaks(), party.is_doubtful()), ("mavlink_v1", doubtful));
             assert!(end <= Timestamp::ZERO + SILENCE + INTRODUCTION, "{end:?}");
+        }
+    }
+
+    /// "Finds … family, generation": both say who they are, and one of them only when it is asked.
+    #[test]
+    fn the_generations_of_a_gremsy_are_told_apart() {
+        use gremsy::sim::{Device, DeviceSettings, Generation};
+        for (generation, quiet, expected) in [
+            (Generation::V1, false, "gremsy v1"),
+            (Generation::V1, true, "gremsy v1"),
+            (Generation::V2, false, "gremsy v2"),
+            (Generation::V2, true, "gremsy v2"),
+        ] {
+            let settings = DeviceSettings { has_usual_streams: !quiet, ..DeviceSettings::of(generation) };
+            let mut gimbal = Device::new(Timestamp::ZERO, settings);
+            // It listens when it has started.
+            let on = Timestamp::ZERO + Duration::from_secs(10);
+            gimbal.handle_timeout(on);
+            let (_, parties, _) = run_from(on, gimbal);
+
+            assert_eq!(parties[&MavId::new(1, component::GIMBAL)].speaks(), expected, "{generation:?} {quiet}");
         }
     }
 
