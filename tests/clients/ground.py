@@ -32,9 +32,11 @@ def quaternion(pitch_deg, yaw_deg):
 class GroundStation:
     """Sends HEARTBEAT, hears everything, and fails on whatever it cannot decode."""
 
-    def __init__(self, port, system_id, vehicle=1, manager=191, device=154):
+    def __init__(self, port, system_id, vehicle=1, manager=191, device=154, speaker=None):
+        """`speaker` is the component that tells the gimbal's attitude, where that is not the gimbal's own."""
         self.ids = (system_id, mavlink.MAV_COMP_ID_MISSIONPLANNER)
         self._vehicle, self._manager, self._device = vehicle, manager, device
+        self._speaker = device if speaker is None else speaker
         self._connection = mavutil.mavlink_connection(
             f"udpout:127.0.0.1:{port}", source_system=system_id, source_component=self.ids[1], robust_parsing=False
         )
@@ -74,7 +76,7 @@ class GroundStation:
     def _hear(self, message):
         with self._heard:
             self._messages[message.get_type()].append((time.monotonic(), message))
-        from_device = (message.get_srcSystem(), message.get_srcComponent()) == (self._vehicle, self._device)
+        from_device = (message.get_srcSystem(), message.get_srcComponent()) == (self._vehicle, self._speaker)
         if message.get_type() == "GIMBAL_DEVICE_ATTITUDE_STATUS" and from_device:
             self.attitudes.add_status(message)
 
