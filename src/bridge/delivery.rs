@@ -237,6 +237,8 @@ impl Bridge {
         let Target::Component(target) = frame.target() else { return false };
         self.settings.control.snoop_autopilot
             && self.autopilot == Some(target)
+            // It is obeyed by the autopilot, whose demand then comes to the device that we present to it.
+            && !self.is_presenting()
             && (is_for_mounts(frame) || command_number(frame).is_some_and(|number| WORTH_HEARING.contains(&number)))
             && !self.router.route(now, from, frame.source(), frame.target()).channels.is_empty()
     }

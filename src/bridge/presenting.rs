@@ -152,7 +152,8 @@ impl Bridge {
             && self.presented.devices.iter().any(|device| device.component == id.component)
     }
 
-    fn is_presenting(&self) -> bool {
+    /// Whether the autopilot sees a device of ours.
+    pub(super) fn is_presenting(&self) -> bool {
         (0..self.presented.devices.len()).any(|at| !self.channels_presented_on(at).is_empty())
     }
 

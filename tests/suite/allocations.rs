@@ -5,10 +5,10 @@ use std::time::Duration;
 use gimbald::bridge::settings::{Role, Settings, SystemId, Transport};
 use gimbald::bridge::{Bridge, ChannelId, Input};
 use gimbald::timestamp::Timestamp;
-use gimbald::wire::dialect::MavMessage;
+use gimbald::wire::dialect::{GIMBAL_DEVICE_SET_ATTITUDE_DATA, MavMessage};
 use gimbald::wire::{FrameBuffer, MavId};
 
-use crate::support::script::{NAN, device_information, set_pitchyaw, take_control, usual_capabilities};
+use crate::support::script::{NAN, device_information, quaternion, set_pitchyaw, take_control, usual_capabilities};
 use crate::support::tlog;
 use crate::support::world::{AUTOPILOT, GCS, GIMBAL, heartbeat, link};
 
@@ -82,6 +82,45 @@ fn refusing_a_stream_allocates_nothing_and_says_nothing() {
     assert_eq!(rejected["not_in_control"], 500, "{rejected:?}");
 }
 
+/// ArduPilot repeats its setpoint for the device that we present to it fifty times a second for ever: that costs nothing while
+/// it asks for nothing new, nobody is told, and nothing goes to the gimbal.
+#[test]
+fn a_constant_stream_to_the_presented_device_allocates_nothing() {
+    let mut bridge = bridge_with(true);
+    let mut now = Timestamp::ZERO;
+    let mut buffer = FrameBuffer::default();
+    let information = MavMessage::GIMBAL_DEVICE_INFORMATION(device_information(now, usual_capabilities()));
+    let information = buffer.encode_any(GIMBAL, 1, &information).bytes().to_vec();
+    receive(&mut bridge, now, 1, &information);
+    let setpoint = GIMBAL_DEVICE_SET_ATTITUDE_DATA {
+        q: quaternion(-30.0, 10.0),
+        angular_velocity_x: NAN,
+        angular_velocity_y: NAN,
+        angular_velocity_z: NAN,
+        flags: 0,
+        target_system: 1,
+        target_component: 154,
+    };
+    let setpoint = MavMessage::GIMBAL_DEVICE_SET_ATTITUDE(setpoint);
+    let setpoint = buffer.encode_any(AUTOPILOT, 1, &setpoint).bytes().to_vec();
+    let mut repeat = |times: u32| {
+        let mut said = 0;
+        for _ in 0..times {
+            now += Duration::from_millis(20);
+            said += receive(&mut bridge, now, 0, &setpoint);
+        }
+        said
+    };
+    repeat(10);
+
+    let mut said = 0;
+    let counted = allocation_counter::measure(|| said = repeat(200));
+
+    assert_eq!((counted.count_total, counted.bytes_total, said), (0, 0, 0));
+    let presented = bridge.snapshot(now).gimbals[0].presented.clone().expect("it is presented");
+    assert_eq!(presented.stream, "steady");
+}
+
 /// Hands one read to the core and takes what is sent; how often anything was.
 fn receive(bridge: &mut Bridge, now: Timestamp, from: usize, bytes: &[u8]) -> usize {
     bridge.handle_input(now, Input::Received { channel: channel(from), bytes });
@@ -97,7 +136,12 @@ fn source(frame: &[u8]) -> MavId {
 }
 
 fn bridge() -> Bridge {
+    bridge_with(false)
+}
+
+fn bridge_with(present_device: bool) -> Bridge {
     let settings = Settings {
+        present_device,
         system_id: SystemId::Fixed(1),
         links: vec![
             link("autopilot", Role::Autopilot, Transport::Stream),

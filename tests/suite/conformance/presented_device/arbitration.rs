@@ -158,6 +158,18 @@ fn a_new_demand_borrows_and_gives_back() {
     assert_eq!(control, expected.map(|(what, count)| (what.to_owned(), count)));
 }
 
+/// What the autopilot claimed itself, as PX4 does, is no loan of its stream, and not given back for it.
+#[test]
+fn what_the_autopilot_claims_itself_it_keeps() {
+    let mut flight = Flight::new(presenting());
+    assert_eq!(flight.command(&take_control()), Some(ACCEPTED));
+    flight.demand(setpoint(-45.0, 30.0, 0), SECOND);
+    assert_eq!(flight.command(&take_control()), Some(ACCEPTED));
+    flight.world.send(flight.places.autopilot, AUTOPILOT, &take_control());
+    flight.run(20 * SECOND);
+    assert_eq!(flight.holders(), (autopilot(), station()));
+}
+
 /// RC that moves the camera, and a place that the vehicle looks at while it flies by, go on to be obeyed for as long as they
 /// move; each setpoint at once.
 #[test]

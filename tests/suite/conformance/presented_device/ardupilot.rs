@@ -224,3 +224,72 @@ fn a_gimbal_that_comes_later_is_found() {
     flight.run(3 * SECOND);
     assert_eq!(flight.looks_at(), (-40, 5));
 }
+
+/// Gimbal statement 48: "command 1000 with only pitch finite is reported FAILED by the ArduPilot emulation", as the real one
+/// does, and moves nothing; our manager takes it, and what it tells the gimbal has both angles.
+#[test]
+fn statement_48_ardupilot_needs_both_angles_and_we_supply_them() {
+    const FAILED: u8 = 4;
+    let mut flight = Flight::new(presenting());
+    flight.run(8 * SECOND);
+    flight.mission_item(pitchyaw(-50.0, 20.0, NAN, NAN, 0.0));
+    flight.run(3 * SECOND);
+    let pitch_only = pitchyaw(-20.0, NAN, NAN, NAN, 44.0);
+    assert_eq!(flight.command_to_autopilot(&to(AUTOPILOT, pitch_only.clone())), Some(FAILED));
+    flight.run(3 * SECOND);
+    assert_eq!(flight.looks_at(), (-50, 20));
+
+    assert_eq!(flight.command(&pitch_only), Some(ACCEPTED));
+    assert_eq!(flight.told(), Some((44, -20, 20)));
+}
+
+/// `snoop_autopilot` would have a request obeyed twice: by the autopilot, through the device that we present to it, and by us
+/// who overheard it. It is the autopilot that was asked, and its demand that passes the gate.
+#[test]
+fn what_the_autopilot_is_asked_is_not_overheard_as_well() {
+    let mut settings = presenting();
+    settings.control.snoop_autopilot = true;
+    let mut flight = Flight::new(settings);
+    flight.run(8 * SECOND);
+    let named = command_long(AUTOPILOT, 1000, &[-50.0, 20.0, NAN, NAN, 44.0, 0.0, 154.0]);
+    for item in [named, command_long(AUTOPILOT, 205, &[-40.0, 0.0, 10.0, 0.0, 0.0, 0.0, 2.0])] {
+        flight.world.forget();
+        flight.mission_item(item);
+        let at_once: Vec<GIMBAL_DEVICE_SET_ATTITUDE_DATA> = flight.world.take_messages(flight.places.gimbal);
+        assert_eq!(at_once, [], "the autopilot has not asked for it yet");
+        flight.run(8 * SECOND);
+        let setpoint = flight.world.snapshot().gimbals[0].setpoint.clone().expect("it is steered");
+        assert_eq!(setpoint.source.as_deref(), Some("1/1"));
+    }
+    assert_eq!(flight.looks_at(), (-40, 10));
+    let sources: Vec<_> = flight.world.snapshot().gimbals[0].rejected.keys().cloned().collect();
+    assert_eq!(sources, [""; 0]);
+}
+
+/// A gimbal of gimbal protocol v1, which has our device id 1 and its manager's component for a voice, is the same v2 device to
+/// ArduPilot; that voice is not heard there, because ArduPilot does not look whose attitude it is.
+#[test]
+fn a_gimbal_without_v2_is_presented_alike() {
+    use gimbald::gimbals::mavlink_v1::sim as v1;
+    use gimbald::gimbals::settings::{Family, GimbalSettings};
+
+    let gimbal = GimbalSettings { family: Family::MavlinkV1, ..GimbalSettings::found("camera".to_owned()) };
+    let (mut world, places) = World::empty(Settings { gimbals: vec![gimbal], ..presenting() });
+    world.install(places.autopilot, Vehicle::new(world.now, ARDUPILOT));
+    world.install(places.gimbal, v1::Device::new(world.now, v1::DeviceSettings::default()));
+    let mut flight = Flight { world, places };
+    flight.run(8 * SECOND);
+    assert_eq!(flight.world.snapshot().gimbals[0].device_id, Some(1));
+    assert_eq!(flight.stream(), "steady");
+    flight.world.forget();
+    flight.mission_item(pitchyaw(-40.0, 15.0, NAN, NAN, 0.0));
+    flight.run(5 * SECOND);
+    assert_eq!(flight.looks_at(), (-40, 15));
+
+    let to_autopilot = flight.world.take(flight.places.autopilot);
+    assert_eq!(sources(&to_autopilot, &[283, 285]), [GIMBAL]);
+    let told: Vec<gimbald::wire::dialect::GIMBAL_DEVICE_ATTITUDE_STATUS_DATA> = of(&to_autopilot);
+    let (pitch, yaw) = pitch_yaw_deg(told.last().expect("ten a second").q);
+    assert_eq!((told[0].gimbal_device_id, pitch.round() as i32, yaw.round() as i32), (0, -40, 15));
+    assert_eq!(sources(&flight.world.take(flight.places.ground), &[283, 285]), [MANAGER]);
+}
