@@ -173,8 +173,7 @@ pub struct GimbalManager {
     /// The autopilot as far as it drives the gimbal as a device of its own.
     autopilot_client: AutopilotClient,
     mount_senders: MountSenders,
-    /// What is being done in the place of where the gimbal was told to look: it is not told that again meanwhile.
-    paused_by: Option<OperationId>,
+    paused_by: Option<asked::Pause>,
     rejected: BTreeMap<MavId, BTreeMap<&'static str, u64>>,
     outputs: VecDeque<ManagerOutput>,
 }

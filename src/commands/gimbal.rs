@@ -107,11 +107,20 @@ async fn parameters(target: &Target, of_gimbal: &str, name: Option<&str>, json: 
     }
     let value: Value = serde_json::from_slice(&answer).map_err(|error| target.not_gimbald(error))?;
     match (name, printable(value)) {
-        (Some(_), Value::Object(parameter)) => Ok(format!("{}\n", parameter.get("value").unwrap_or(&Value::Null))),
+        (Some(_), Value::Object(parameter)) => {
+            Ok(format!("{}\n", number(parameter.get("value").unwrap_or(&Value::Null))))
+        }
         (None, Value::Object(all)) if all.is_empty() => Ok("none was read\n".to_owned()),
-        (None, Value::Object(all)) => Ok(all.iter().map(|(name, value)| format!("{name:<16} {value}\n")).collect()),
+        (None, Value::Object(all)) => {
+            Ok(all.iter().map(|(name, value)| format!("{name:<16} {}\n", number(value))).collect())
+        }
         (_, other) => Err(target.not_gimbald(other).into()),
     }
+}
+
+/// Most parameters are whole numbers.
+fn number(value: &Value) -> String {
+    value.as_f64().map_or_else(|| value.to_string(), |number| number.to_string())
 }
 
 /// Asks for it once, or as long as it is to last; then, and at Ctrl-C, what turns is stopped.

@@ -1,5 +1,6 @@
 //! Asks a running daemon how it is, and shows the answer to a person.
 
+mod details;
 pub(super) mod text;
 
 use std::io::{self, IsTerminal, Write};

@@ -77,6 +77,14 @@ pub enum NotDone {
 /// What became of something asked.
 pub type Answer = Result<(), NotDone>;
 
+/// What is being done in the place of where the gimbal was told to look: it is not told that again meanwhile.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pause {
+    id: OperationId,
+    /// It leaves the gimbal to its radio control.
+    hands_over: bool,
+}
+
 /// Whether it is done, or its answer comes later.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {
@@ -249,7 +257,7 @@ impl GimbalManager {
             if self.tracking.stop_rates(now) {
                 self.carry_out(now, around);
             }
-            self.paused_by = Some(id);
+            self.paused_by = Some(Pause { id, hands_over: *operation == Operation::RadioControl });
         }
         self.outputs.push_back(ManagerOutput::Operate { id, operation: operation.clone() });
         Ok(Progress::UnderWay)
@@ -258,11 +266,11 @@ impl GimbalManager {
     /// What became of an operation. One that was done has taken the place of what the gimbal was told before; after one
     /// that was not it goes on with that.
     pub fn handle_operated(&mut self, now: Timestamp, id: OperationId, is_done: bool, around: Surroundings<'_>) {
-        if self.paused_by.take_if(|paused_by| *paused_by == id).is_none() {
-            return;
-        }
-        if is_done {
-            self.tracking.forget();
+        let Some(pause) = self.paused_by.take_if(|pause| pause.id == id) else { return };
+        match (is_done, pause.hands_over) {
+            (true, true) => self.tracking.leave_to_radio_control(),
+            (true, false) => self.tracking.forget(),
+            (false, _) => {}
         }
         self.carry_out(now, around);
     }

@@ -56,6 +56,8 @@ pub struct Tracking {
     stale: bool,
     /// When radio control was last asked to let go of the gimbal.
     let_go: Option<Timestamp>,
+    /// It was left to its radio control until the next demand, by something else than a demand.
+    left_to_radio_control: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,6 +86,7 @@ impl Tracking {
             last_heading: None,
             stale: false,
             let_go: None,
+            left_to_radio_control: false,
         }
     }
 
@@ -243,6 +246,7 @@ impl Tracking {
         self.last = None;
         self.stale = false;
         self.let_go = None;
+        self.left_to_radio_control = false;
         self.nudge = Nudge::default();
     }
 
@@ -356,6 +360,7 @@ impl Tracking {
 
     fn begin(&mut self, now: Timestamp, source: MavId, aim: Aim) {
         self.aim = aim;
+        self.left_to_radio_control = false;
         self.source = Some(source);
         self.carried_to = now;
         self.next = Some(now);

@@ -51,6 +51,7 @@ pub fn report(snapshot: &Snapshot) -> String {
 pub fn gimbal_report(gimbal: &GimbalSnapshot) -> String {
     let mut out = Lines::default();
     self::gimbal(&mut out, gimbal);
+    super::details::details(&mut out, &gimbal.details);
     out.0.trim_start().to_owned()
 }
 
@@ -216,7 +217,7 @@ fn setpoint(setpoint: &SetpointSnapshot) -> String {
 }
 
 /// Columns as wide as their widest cell; the last is left as it is.
-fn aligned<const N: usize>(rows: &[[String; N]]) -> Vec<String> {
+pub(super) fn aligned<const N: usize>(rows: &[[String; N]]) -> Vec<String> {
     let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
     let widths: [usize; N] = std::array::from_fn(width);
     let line = |row: &[String; N]| {
@@ -226,7 +227,7 @@ fn aligned<const N: usize>(rows: &[[String; N]]) -> Vec<String> {
     rows.iter().map(line).collect()
 }
 
-fn degrees(value: Option<f64>) -> String {
+pub(super) fn degrees(value: Option<f64>) -> String {
     // Adding zero takes the sign off a rounded minus zero.
     value.map_or_else(|| "–".to_owned(), |value| format!("{:.1}°", (value * 10.0).round() / 10.0 + 0.0))
 }
@@ -242,7 +243,7 @@ fn altitude(amsl_m: Option<f64>) -> String {
     amsl_m.map_or_else(|| "–".to_owned(), |metres| format!("{metres:.1} m above mean sea level"))
 }
 
-fn age(ms: Option<u64>) -> String {
+pub(super) fn age(ms: Option<u64>) -> String {
     match ms {
         None => "never heard".to_owned(),
         Some(ms @ 0..1_000) => format!("{ms} ms ago"),
@@ -276,10 +277,10 @@ fn counts(counts: &BTreeMap<String, u64>) -> String {
 }
 
 #[derive(Default)]
-struct Lines(String);
+pub(super) struct Lines(pub(super) String);
 
 impl Lines {
-    fn line(&mut self, depth: usize, text: &str) {
+    pub(super) fn line(&mut self, depth: usize, text: &str) {
         writeln!(self.0, "{:indent$}{text}", "", indent = 2 * depth).expect("a String takes every text");
     }
 
@@ -288,11 +289,11 @@ impl Lines {
         self.line(0, text);
     }
 
-    fn fact(&mut self, name: &str, text: &str) {
+    pub(super) fn fact(&mut self, name: &str, text: &str) {
         self.line(1, &format!("{name:<9} {text}"));
     }
 
-    fn fact_unless_empty(&mut self, name: &str, text: &str) {
+    pub(super) fn fact_unless_empty(&mut self, name: &str, text: &str) {
         if !text.is_empty() {
             self.fact(name, text);
         }

@@ -23,7 +23,13 @@ impl Tracking {
 
     /// Whether it is, or is to be, in the hands of its radio control because a client asked for that.
     pub(super) fn is_handed_over(&self) -> bool {
-        hands_over(&self.aim)
+        hands_over(&self.aim) || self.left_to_radio_control
+    }
+
+    /// The gimbal was left to its radio control, until somebody demands something.
+    pub fn leave_to_radio_control(&mut self) {
+        self.forget();
+        self.left_to_radio_control = true;
     }
 
     /// Whether `aim` may be taken up; with one that takes the gimbal back, radio control begins to let go of it.
