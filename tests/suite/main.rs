@@ -9,6 +9,7 @@ mod daemon;
 mod daemon_pacing;
 mod demo;
 mod dialect_oracle;
+mod families_document;
 mod gimbal_manager_document;
 mod gimbald;
 mod interface_document;

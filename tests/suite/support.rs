@@ -2,6 +2,7 @@
 
 pub mod control_rule;
 pub mod daemon;
+pub mod documented;
 pub mod ground_station;
 pub mod hub;
 pub mod line;
