@@ -165,6 +165,11 @@ impl Bridge {
         let Some(system) = self.identity.system() else { return false };
         let target = frame.target();
         let is_directed = matches!(target, Target::Component(_));
+        // Of what is said to everybody a device heeds its setpoints and commands.
+        let heeds = [message::GIMBAL_DEVICE_SET_ATTITUDE, message::COMMAND_LONG, message::COMMAND_INT];
+        if !is_directed && !heeds.contains(&frame.message_id()) {
+            return false;
+        }
         let mut is_taken = false;
         for at in 0..self.presented.devices.len() {
             let id = MavId::new(system, self.presented.devices[at].component);

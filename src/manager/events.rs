@@ -252,6 +252,7 @@ fn explain(reason: &str) -> String {
         "holder_ranks_no_lower" => "ranks no lower (takeover = \"priority\")",
         "exclusively_held" => "must release first (takeover = \"exclusive\")",
         "nobody_in_control" => "nobody is in control, and unclaimed = \"closed\" lets nobody steer before",
+        "overruled" => "it goes on moving after somebody else took over; it is obeyed again when it asks for something new",
         "acquire_war" => "control changed hands too often lately",
         "other_vehicle" => "it belongs to another vehicle",
         "only_for_the_holder" => "only who has control may ask for that",

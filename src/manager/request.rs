@@ -463,3 +463,56 @@ fn claim(command: &Command, first: usize) -> Result<Claim, Refusal> {
         _ => Err(Refusal::denied("half_a_pair")),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NAN: f32 = f32::NAN;
+    /// 90° to the right.
+    const RIGHT: [f32; 4] = [0.707_106_77, 0.0, 0.0, 0.707_106_77];
+    const AHEAD: [f32; 4] = [1.0, 0.0, 0.0, 0.0];
+    const NONE: [f32; 4] = [NAN; 4];
+
+    fn read(q: [f32; 4], [x, y, z]: [f32; 3], flags: u16) -> Result<Option<Demand>, Refusal> {
+        device_set_attitude(&GIMBAL_DEVICE_SET_ATTITUDE_DATA {
+            q,
+            angular_velocity_x: x,
+            angular_velocity_y: y,
+            angular_velocity_z: z,
+            flags,
+            target_system: 1,
+            target_component: 154,
+        })
+    }
+
+    /// "284 with NaN q (rates, ArduPilot; no input yet, PX4) or identity q (rates, PX4)."
+    #[test]
+    #[rustfmt::skip]
+    fn what_autopilots_tell_a_device_is_read_as_each_means_it() {
+        for (q, rates, flags, expected) in [
+            // Yaw, and yaw rate; whole degrees.
+            (RIGHT, [NAN; 3],        0,  Ok(Some((Some(90), None)))),
+            (RIGHT, [0.0, 0.0, 1.0], 28, Ok(Some((Some(90), None)))),
+            (AHEAD, [0.0; 3],        32, Ok(Some((Some(0), None)))),
+            (AHEAD, [0.0, 0.0, 1.0], 16, Ok(Some((None, Some(57))))),
+            (NONE,  [0.0, 0.0, 1.0], 28, Ok(Some((None, Some(57))))),
+            (NONE,  [0.0; 3],        28, Ok(Some((None, Some(0))))),
+            (NONE,  [NAN; 3],        44, Ok(None)),
+            (NONE,  [NAN; 3],        1,  Ok(Some((None, None)))),
+            (NONE,  [0.0, 0.0, f32::INFINITY], 0, Err("infinite_number")),
+            ([0.0; 4], [NAN; 3],     0,  Err("malformed_quaternion")),
+            ([1.2, 0.0, 0.0, 0.0], [NAN; 3], 0, Err("malformed_quaternion")),
+            (AHEAD, [NAN; 3],        32 | 64, Err("both_yaw_frames")),
+        ] {
+            let yaw = |demand: Demand| {
+                let angle = demand.yaw.angle.map(|angle| angle.degrees().round() as i32);
+                (angle, demand.yaw.rate.map(|rate| rate.degrees_per_second().round() as i32))
+            };
+            let found = read(q, rates, flags).map(|demand| demand.map(yaw)).map_err(|refusal| refusal.reason);
+            assert_eq!(found, expected, "{q:?} {rates:?} {flags}");
+        }
+        assert!(read(NONE, [0.0, 0.0, 1.0], 28).is_ok_and(|demand| demand.is_some_and(|demand| demand.turns())));
+        assert!(read(NONE, [0.0; 3], 28).is_ok_and(|demand| demand.is_some_and(|demand| !demand.turns())));
+    }
+}

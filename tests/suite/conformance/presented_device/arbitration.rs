@@ -8,10 +8,12 @@ use gimbald::manager::settings::ControlSettings;
 use gimbald::timestamp::Timestamp;
 use gimbald::wire::dialect::{COMMAND_ACK_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA, MavMessage};
 
+use proptest::prelude::*;
+
 use super::{PERIOD, SECOND, introduce, presenting, setpoint, turning, with_device};
 use crate::support::script::{
-    ACCEPTED, DENIED, NAN, ardupilot_heartbeat, autopilot_state, command_int, device_status, gimbal_heartbeat,
-    global_position, ground_heartbeat, of, pitch_yaw_deg, pitchyaw, take_control, usual_capabilities,
+    ACCEPTED, DENIED, NAN, ardupilot_heartbeat, autopilot_state, command_int, configure, device_status,
+    gimbal_heartbeat, global_position, ground_heartbeat, of, pitch_yaw_deg, pitchyaw, take_control, usual_capabilities,
 };
 use crate::support::world::{AUTOPILOT, GCS, GIMBAL, Places, World};
 
@@ -362,4 +364,89 @@ fn a_place_named_to_the_device_is_looked_at() {
     // Nobody else names places to the device.
     let from_station = flight.world.ask(flight.places.autopilot, GCS, &north);
     assert_eq!(of::<COMMAND_ACK_DATA>(&from_station)[0].result, 3);
+}
+
+/// PX4 with `MNT_MODE_OUT` 2 drives a device as well, and in its own way: 283 is asked of everybody, 284 comes to no component
+/// in particular, with frame bits, with NaN before it has any input, and with the identity beside a rate.
+#[test]
+fn px4_drives_the_device_alike() {
+    let (world, places) = with_device(presenting());
+    let to_everybody = |message: MavMessage, flags: u16, q: Option<[f32; 4]>| match message {
+        MavMessage::GIMBAL_DEVICE_SET_ATTITUDE(message) => {
+            MavMessage::GIMBAL_DEVICE_SET_ATTITUDE(GIMBAL_DEVICE_SET_ATTITUDE_DATA {
+                q: q.unwrap_or(message.q),
+                flags,
+                target_component: 0,
+                ..message
+            })
+        }
+        other => other,
+    };
+    let nothing = to_everybody(setpoint(0.0, 0.0, 0), 44, Some([NAN; 4]));
+    let mut flight = Flight { world, places, demand: nothing };
+    flight.run(5 * SECOND);
+    assert_eq!(flight.told(), None);
+
+    flight.demand(to_everybody(setpoint(-30.0, 15.0, 0), 32, None), SECOND);
+    assert_eq!(flight.told(), Some((44, -30, 15)));
+    // The nose points East.
+    flight.demand(to_everybody(setpoint(-10.0, 100.0, 0), 80, None), SECOND);
+    assert_eq!(flight.told(), Some((44, -10, 10)));
+    let turns = to_everybody(turning(2.0, 0.0), 32, Some([1.0, 0.0, 0.0, 0.0]));
+    flight.demand(turns, 2 * SECOND);
+    let told: Vec<GIMBAL_DEVICE_SET_ATTITUDE_DATA> = flight.world.take_messages(flight.places.gimbal);
+    let told = told.last().expect("it turns");
+    assert!((told.angular_velocity_y.to_degrees() - 2.0).abs() < 0.01 && told.q[0].is_nan(), "{told:?}");
+    assert_eq!(flight.world.snapshot().conflicts, [""; 0]);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+
+    /// Whatever the autopilot demands and a station does, in any order: five seconds after its last demand the autopilot has no
+    /// control, and the stream that goes on takes none; and while a station has control and the demand rests, it keeps it.
+    #[test]
+    fn a_stream_that_rests_has_no_control(steps in prop::collection::vec(step(), 1..12)) {
+        let mut flight = Flight::new(presenting());
+        for step in steps {
+            match step {
+                Step::Demand(pitch, flags, millis) => {
+                    flight.demand(setpoint(f64::from(pitch), 0.0, flags), Duration::from_millis(millis));
+                }
+                Step::Turn(rate, millis) => flight.demand(turning(f64::from(rate), 0.0), Duration::from_millis(millis)),
+                Step::Take => { flight.command(&take_control()); }
+                Step::Release => { flight.command(&configure([-3.0, -3.0], [-1.0, -1.0])); }
+                Step::Steer(pitch) => { flight.command(&pitchyaw(f32::from(pitch), 0.0, NAN, NAN, 44.0)); }
+            }
+        }
+        flight.run(6 * SECOND);
+        prop_assert_ne!(flight.holders().0, autopilot());
+        prop_assert_eq!(flight.holders().1, None);
+        let holder = flight.holders().0;
+        flight.run(20 * SECOND);
+        prop_assert_eq!(flight.holders().0, holder);
+        let rotates = flight.world.snapshot().gimbals[0].setpoint.as_ref().is_some_and(|setpoint| setpoint.mode == "rate");
+        prop_assert!(!rotates);
+    }
+}
+
+/// Something that the autopilot, or the station, does.
+#[derive(Clone, Debug)]
+enum Step {
+    /// Pitch in degrees, flags, and for how many milliseconds.
+    Demand(i8, u16, u64),
+    Turn(i8, u64),
+    Take,
+    Release,
+    Steer(i8),
+}
+
+fn step() -> impl Strategy<Value = Step> {
+    prop_oneof![
+        (-80_i8..20, prop_oneof![Just(0), Just(28)], 20_u64..4_000).prop_map(|(p, f, t)| Step::Demand(p, f, t)),
+        (-5_i8..=5, 20_u64..4_000).prop_map(|(rate, t)| Step::Turn(rate, t)),
+        Just(Step::Take),
+        Just(Step::Release),
+        (-80_i8..20).prop_map(Step::Steer),
+    ]
 }
