@@ -1,22 +1,25 @@
 //! Listens, and keeps every client within bounds.
 //!
 //! `axum::serve` knows neither time-outs nor a limit of connections, so hyper is driven here. A client may be slow to
-//! ask ([`Limits::header`]), slow to read, or stay ([`Limits::lifetime`]); what is beyond [`Limits::connections`] waits
-//! in the kernel until a place is free, which these limits make sure of.
+//! ask ([`Limits::header`]), slow to read, or stay ([`Limits::lifetime`]). Of more than [`Limits::connections`] those that
+//! ask for nothing make room for those that come, so that whoever only holds connections open keeps nobody out.
 
+use std::collections::VecDeque;
 use std::io;
 use std::net::SocketAddr;
 use std::pin::pin;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use axum::Router;
 use hyper::server::conn::http1;
+use hyper::service::{Service, service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use tokio::net::{TcpListener, TcpSocket, TcpStream};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
-use tokio::time::{sleep, timeout};
+use tokio::task::{AbortHandle, JoinSet};
+use tokio::time::{Instant, sleep, timeout};
 use tracing::{debug, info, warn};
 
 use super::control::Controls;
@@ -121,15 +124,15 @@ fn remedy(kind: io::ErrorKind) -> &'static str {
 }
 
 async fn serve(listener: TcpListener, router: Router, limits: Limits) {
-    let places = Arc::new(Semaphore::new(limits.connections));
+    let mut guests = Guests::new(limits.connections);
     let mut failing = false;
     loop {
-        let place = Arc::clone(&places).acquire_owned().await.expect("the semaphore is never closed");
         match listener.accept().await {
             Ok((stream, peer)) => {
                 failing = false;
                 debug!(%peer, "connection accepted");
-                tokio::spawn(converse(stream, router.clone(), limits, place));
+                guests.make_room().await;
+                guests.admit(|is_asking| converse(stream, router.clone(), limits, is_asking));
             }
             Err(error) => {
                 if !failing {
@@ -143,11 +146,71 @@ async fn serve(listener: TcpListener, router: Router, limits: Limits) {
     }
 }
 
-async fn converse(stream: TcpStream, router: Router, limits: Limits, _place: OwnedSemaphorePermit) {
+/// Nobody has to make room for others before he had so long to ask.
+const COURTESY: Duration = Duration::from_millis(100);
+
+/// The connections that are served, the oldest first.
+struct Guests {
+    most: usize,
+    tasks: JoinSet<()>,
+    guests: VecDeque<Guest>,
+}
+
+struct Guest {
+    admitted: Instant,
+    task: AbortHandle,
+    is_asking: IsAsking,
+}
+
+/// Whether a connection has sent a request that is not answered yet.
+type IsAsking = Arc<AtomicBool>;
+
+impl Guests {
+    fn new(most: usize) -> Self {
+        Self { most, tasks: JoinSet::new(), guests: VecDeque::new() }
+    }
+
+    /// Whoever comes is let in: for him goes who has asked for nothing for the longest time, or else he waits until
+    /// somebody has his answer.
+    async fn make_room(&mut self) {
+        loop {
+            while self.tasks.try_join_next().is_some() {}
+            self.guests.retain(|guest| !guest.task.is_finished());
+            if self.guests.len() < self.most {
+                return;
+            }
+            let idle = self.guests.iter().find(|guest| !guest.is_asking.load(Ordering::Relaxed));
+            let patience = idle.map_or(Duration::MAX, |guest| COURTESY.saturating_sub(guest.admitted.elapsed()));
+            if let Some(idle) = idle.filter(|_| patience.is_zero()) {
+                idle.task.abort();
+            }
+            let patience = if patience.is_zero() { Duration::MAX } else { patience };
+            // Only how long it takes matters: who has left is seen above.
+            let _ = timeout(patience, self.tasks.join_next()).await;
+        }
+    }
+
+    fn admit<F: Future<Output = ()> + Send + 'static>(&mut self, converse: impl FnOnce(IsAsking) -> F) {
+        let is_asking = IsAsking::default();
+        let task = self.tasks.spawn(converse(Arc::clone(&is_asking)));
+        self.guests.push_back(Guest { admitted: Instant::now(), task, is_asking });
+    }
+}
+
+async fn converse(stream: TcpStream, router: Router, limits: Limits, is_asking: IsAsking) {
     if let Err(error) = stream.set_nodelay(true) {
         debug!(%error, "answers may come late");
     }
-    let service = TowerToHyperService::new(router);
+    let router = TowerToHyperService::new(router);
+    let service = service_fn(move |request| {
+        let (answer, is_asking) = (router.call(request), Arc::clone(&is_asking));
+        async move {
+            is_asking.store(true, Ordering::Relaxed);
+            let answer = answer.await;
+            is_asking.store(false, Ordering::Relaxed);
+            answer
+        }
+    });
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())
         .header_read_timeout(limits.header)

@@ -220,23 +220,39 @@ fn another_host_is_refused() {
     }
 }
 
-/// "At most 32 connections": whoever comes later waits until one is free.
+/// "At most 32 connections": for whoever comes later goes the oldest that asks for nothing.
 #[test]
-fn connections_beyond_the_limit_wait() {
+fn connections_that_ask_for_nothing_make_room() {
     let limits = Limits { connections: 2, header: FOREVER, lifetime: FOREVER, ..Limits::default() };
     let window = Window::open(Some(Snapshot::default()), limits);
-    let first = window.connect();
-    let _second = window.connect();
+    let mut first = window.connect();
+    first.write_all(b"GET /healthz HT").expect("the kernel takes it");
+    let mut second = window.connect();
     let mut third = window.connect();
+
     third.write_all(HEALTHZ).expect("the kernel takes the request");
 
-    third.set_read_timeout(Some(Duration::from_millis(300))).expect("a time-out");
-    let waiting = third.read(&mut [0]).expect_err("all places are taken");
-    assert_eq!(waiting.kind(), ErrorKind::WouldBlock);
-
-    drop(first);
-    third.set_read_timeout(Some(PATIENCE)).expect("a time-out");
     assert_eq!(Answer::read(third).body, "ok");
+    first.set_read_timeout(Some(PATIENCE)).expect("a time-out");
+    assert_eq!(first.read(&mut [0]).expect("the connection is closed"), 0);
+    second.write_all(HEALTHZ).expect("the kernel takes the request");
+    assert_eq!(Answer::read(second).body, "ok", "there was room for two");
+}
+
+/// Whoever has asked gets the answer, and whoever comes waits for that.
+#[test]
+fn connections_that_are_answered_are_not_cut() {
+    let limits = Limits { connections: 1, ..Limits::default() };
+    // It hangs, so that the answer takes a second.
+    let window = Window::open(None, limits);
+    let mut first = window.connect();
+    first.write_all(HEALTHZ).expect("the kernel takes the request");
+    let mut second = window.connect();
+    second.write_all(b"GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n").expect("the kernel takes it");
+
+    let error = json!({"error": "the core did not answer within 1 s"});
+    assert_eq!(Answer::read(first).json(), error);
+    assert_eq!(Answer::read(second).status, 200);
 }
 
 /// A client that sends its headers by the byte, or nothing at all, loses its place.
