@@ -25,6 +25,7 @@ mod mount_reports;
 mod ownership;
 pub mod roi;
 mod telling;
+mod vendor_commands;
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
@@ -55,6 +56,7 @@ use request::{Demand, DemandKind, Refusal, Request};
 use settings::ControlSettings;
 use telling::can_aim;
 use tracking::{RateTimeouts, Situation, Tracking};
+pub use vendor_commands::Commander;
 use voice::DeviceVoice;
 
 /// An attitude older than this is not where the gimbal looks now.
@@ -104,6 +106,11 @@ pub enum ManagerOutput {
         channels: Option<ChannelSet>,
     },
     Steer(Setpoint),
+    /// The operation of that id was asked for by a command, which is answered once more when it is done.
+    Commanded {
+        id: OperationId,
+        commander: Commander,
+    },
     /// For the driver; it answers.
     Operate {
         id: OperationId,
@@ -174,6 +181,9 @@ pub struct GimbalManager {
     autopilot_client: AutopilotClient,
     mount_senders: MountSenders,
     paused_by: Option<asked::Pause>,
+    /// Whose commands of which number are being done by the gimbal.
+    commanded: Vec<(MavId, u16)>,
+    next_command: u64,
     rejected: BTreeMap<MavId, BTreeMap<&'static str, u64>>,
     outputs: VecDeque<ManagerOutput>,
 }
@@ -210,6 +220,8 @@ impl GimbalManager {
             autopilot_client: AutopilotClient::default(),
             mount_senders: MountSenders::default(),
             paused_by: None,
+            commanded: Vec::new(),
+            next_command: 0,
             rejected: BTreeMap::new(),
             outputs: VecDeque::new(),
         }

@@ -9,8 +9,8 @@ use super::outbox::Outbox;
 use super::roster::{Gimbal, Roster};
 use super::{Bridge, surroundings};
 use crate::gimbals::operation::{OperationError, OperationId};
-use crate::manager::DeviceState;
 use crate::manager::asked::{Answer, Asked, NotDone, Progress};
+use crate::manager::{Commander, DeviceState};
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 
@@ -32,6 +32,15 @@ struct Entry {
     /// The manager of the gimbal.
     component: u8,
     until: Timestamp,
+    asker: Asker,
+}
+
+/// Who is told what became of it.
+#[derive(Clone, Copy, Debug)]
+enum Asker {
+    Outside,
+    /// A command, which gets its last answer.
+    Command(Commander),
 }
 
 impl UnderWay {
@@ -41,13 +50,14 @@ impl UnderWay {
 
     /// The process is to end.
     pub fn end_all(&mut self, outbox: &mut Outbox) {
-        for entry in self.entries.drain(..) {
+        for entry in self.entries.drain(..).filter(|entry| matches!(entry.asker, Asker::Outside)) {
             outbox.push_answer(entry.id, Err(NotDone::Ending));
         }
     }
 
-    fn take(&mut self, id: OperationId) -> Option<Entry> {
-        let at = self.entries.iter().position(|entry| entry.id == id)?;
+    /// The ids of commands are their manager's own.
+    fn take(&mut self, component: u8, id: OperationId) -> Option<Entry> {
+        let at = self.entries.iter().position(|entry| (entry.component, entry.id) == (component, id))?;
         Some(self.entries.swap_remove(at))
     }
 }
@@ -75,19 +85,33 @@ impl Bridge {
         let component = gimbal.component;
         let progress = gimbal.manager.handle_asked(now, MavId::new(system, component), id, asked, around)?;
         if progress == Progress::UnderWay {
-            self.asked.entries.push(Entry { id, component, until: now + DEADLINE });
+            self.asked.entries.push(Entry { id, component, until: now + DEADLINE, asker: Asker::Outside });
         }
         Ok(progress)
     }
 
+    /// The operation of `id` was asked for by a command.
+    pub(super) fn handle_commanded(&mut self, now: Timestamp, component: u8, id: OperationId, commander: Commander) {
+        let entry = Entry { id, component, until: now + DEADLINE, asker: Asker::Command(commander) };
+        self.asked.entries.push(entry);
+        if self.asked.entries.len() > MAX_UNDER_WAY {
+            self.conclude(now, component, id, Err(NotDone::TooMuch));
+        }
+    }
+
     /// What became of one. What a driver says of one that was answered already is of no use to anybody.
-    pub(super) fn conclude(&mut self, now: Timestamp, id: OperationId, answer: Answer) {
-        let Some(entry) = self.asked.take(id) else { return };
+    pub(super) fn conclude(&mut self, now: Timestamp, component: u8, id: OperationId, answer: Answer) {
+        let Some(entry) = self.asked.take(component, id) else { return };
         let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
         if let Some(gimbal) = self.roster.of_manager(entry.component) {
             gimbal.manager.handle_operated(now, id, answer.is_ok(), around);
+            if let Asker::Command(commander) = entry.asker {
+                gimbal.manager.handle_commanded(commander, &answer);
+            }
         }
-        self.outbox.push_answer(id, answer);
+        if matches!(entry.asker, Asker::Outside) {
+            self.outbox.push_answer(id, answer);
+        }
     }
 
     /// Ends those of which the drivers have said nothing for too long.
@@ -104,9 +128,10 @@ impl Bridge {
     }
 
     fn end_asked(&mut self, now: Timestamp, error: &OperationError, is_over: impl Fn(&Roster, &Entry) -> bool) {
-        while let Some(id) = self.asked.entries.iter().find(|entry| is_over(&self.roster, entry)).map(|entry| entry.id)
+        while let Some(Entry { id, component, .. }) =
+            self.asked.entries.iter().find(|entry| is_over(&self.roster, entry)).copied()
         {
-            self.conclude(now, id, Err(NotDone::Operation(error.clone())));
+            self.conclude(now, component, id, Err(NotDone::Operation(error.clone())));
         }
     }
 }

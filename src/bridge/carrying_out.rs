@@ -62,7 +62,7 @@ impl Bridge {
                     }
                     GimbalOutput::Driver(DriverOutput::Operated { id, result }) => {
                         let answer = result.map_err(NotDone::Operation);
-                        self.conclude(now, id, answer);
+                        self.conclude(now, component, id, answer);
                     }
                     GimbalOutput::Manager(output) => self.carry_out_for_manager(now, at, component, output),
                 }
@@ -99,6 +99,7 @@ impl Bridge {
                 self.answer(now, channels.unwrap_or(self.channels.open_set()), component, &message);
             }
             ManagerOutput::Steer(setpoint) => self.roster.get_mut(at).driver.handle_setpoint(now, setpoint),
+            ManagerOutput::Commanded { id, commander } => self.handle_commanded(now, component, id, commander),
             ManagerOutput::Operate { id, operation } => {
                 self.roster.get_mut(at).driver.handle_operation(now, id, operation)
             }

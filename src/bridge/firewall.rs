@@ -6,18 +6,20 @@
 
 use super::Bridge;
 use super::conflicts::{Conflict, Outcome};
+use super::delivery::command_number;
 use super::delivery::is_for_mounts;
 use super::devices::is_of_device;
-use super::roster::Place;
+use super::roster::{Gimbal, Place};
 use super::settings::Role;
 use crate::channel::ChannelSet;
+use crate::gimbals::settings::Family;
 use crate::manager::settings::Firewall;
 use crate::timestamp::Timestamp;
 use crate::wire::Frame;
 use crate::wire::dialect::{
     GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_MANAGER_INFORMATION_DATA, GIMBAL_MANAGER_STATUS_DATA,
 };
-use crate::wire::ids::message;
+use crate::wire::ids::{command, message};
 
 impl Bridge {
     /// Keeps from managed devices what others send straight to them, and on its link what a device sends as a manager.
@@ -58,9 +60,22 @@ impl Bridge {
                 channels
             }
             message::GIMBAL_DEVICE_SET_ATTITUDE => self.keep_from_devices(now, place, frame, channels),
-            _ if is_for_mounts(frame) => self.keep_from_devices(now, place, frame, channels),
+            _ if is_for_mounts(frame) || self.is_of_a_vendor(frame) => {
+                self.keep_from_devices(now, place, frame, channels)
+            }
             _ => channels,
         }
+    }
+
+    /// Whether a gimbal would take it for a command of its maker's own: motors, modes, a restart.
+    fn is_of_a_vendor(&self, frame: &Frame<'_>) -> bool {
+        let is_one = matches!(
+            command_number(frame),
+            Some(command::USER_1 | command::USER_2 | command::PREFLIGHT_REBOOT_SHUTDOWN)
+        );
+        let has_such = |gimbal: &Gimbal| gimbal.driver.family() == Family::Gremsy;
+        let is_meant = |gimbal: &Gimbal| gimbal.manager.device().is_some_and(|device| frame.target().includes(device));
+        is_one && self.roster.iter().any(|gimbal| has_such(gimbal) && is_meant(gimbal))
     }
 
     /// R15: on our gimbals we are the only party that says where to look.

@@ -10,6 +10,8 @@ pub struct Capabilities {
     pub limits: Limits,
     /// It turns at a rate by itself; otherwise its angles are turned for it.
     pub turns: bool,
+    /// It has functions beyond where it looks ([`Operation`](super::operation::Operation)).
+    pub operates: bool,
 }
 
 impl Capabilities {
@@ -21,6 +23,6 @@ impl Capabilities {
             | CapFlags::HAS_PITCH_LOCK
             | CapFlags::HAS_YAW_AXIS
             | CapFlags::HAS_YAW_FOLLOW;
-        Self { flags, limits: Limits::default(), turns: true }
+        Self { flags, limits: Limits::default(), turns: true, operates: false }
     }
 }

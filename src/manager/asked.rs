@@ -204,7 +204,7 @@ impl GimbalManager {
 
     /// Keeps where the gimbal looks, yaw in `frame`, or in the one that it is held in. A rotation is stopped first, as
     /// fast as the gimbal can.
-    fn stay(
+    pub(super) fn stay(
         &mut self,
         now: Timestamp,
         who: MavId,
@@ -229,7 +229,7 @@ impl GimbalManager {
         Ok(())
     }
 
-    fn do_operation(
+    pub(super) fn do_operation(
         &mut self,
         now: Timestamp,
         who: MavId,

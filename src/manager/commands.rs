@@ -1,7 +1,7 @@
 //! `COMMAND_LONG` and `COMMAND_INT` for a gimbal manager, each with its one answer.
 //!
 //! What a command is about is in files of its own: [`super::inquiries`] (512, 511, 510), [`super::roi`] (195, 197),
-//! [`super::mount`] (204, 205, 220). Those that we do not know are refused by name to whoever addressed exactly us, and are
+//! [`super::mount`] (204, 205, 220), [`super::vendor_commands`] (31010, 31011, 246). Those that we do not know are refused by name to whoever addressed exactly us, and are
 //! somebody else's business when everybody was asked.
 
 use std::time::Duration;
@@ -19,6 +19,8 @@ const REPEATED_WITHIN: Duration = Duration::from_secs(1);
 pub(super) enum Outcome {
     /// Done.
     Accepted,
+    /// Begun; another answer comes when it is done.
+    InProgress,
     /// Not for us: addressed to everybody or only overheard, and somebody else's business.
     Ignored,
 }
@@ -42,6 +44,7 @@ impl GimbalManager {
         let first_answer = self.outputs.len();
         let result = match self.execute(now, sender, command, around) {
             Ok(Outcome::Accepted) => CommandResult::Accepted,
+            Ok(Outcome::InProgress) => CommandResult::InProgress,
             Ok(Outcome::Ignored) => return,
             Err(refusal) => {
                 self.count_refusal(sender.id, refusal.reason);
@@ -76,6 +79,11 @@ impl GimbalManager {
             | command::DO_MOUNT_CONTROL_QUAT => self.handle_once(now, sender.id, command, around),
             // Old ground stations say it to the autopilot; among managers it was superseded before there were any.
             command::DO_SET_ROI if around.overheard => self.handle_once(now, sender.id, command, around),
+            command::USER_1 | command::USER_2 | command::PREFLIGHT_REBOOT_SHUTDOWN
+                if command.is_directed() && !around.overheard =>
+            {
+                self.vendor_command(now, sender, command, around)
+            }
             number if command.is_directed() && !around.overheard => Err(unsupported(number)),
             _ => Ok(Outcome::Ignored),
         }
@@ -206,12 +214,12 @@ impl GimbalManager {
 }
 
 /// The refusal of a command that we do not carry out; a person looking reads which one it was.
-fn unsupported(number: u16) -> Refusal {
+pub(super) fn unsupported(number: u16) -> Refusal {
     let reason = match number {
         command::DO_SET_ROI_WPNEXT_OFFSET => "do_set_roi_wpnext_offset_unsupported",
         command::DO_SET_ROI_SYSID => "do_set_roi_sysid_unsupported",
         command::DO_SET_ROI => "do_set_roi_unsupported",
-        // Known, and never done for anybody.
+        // Known, and done only for a gimbal that it names.
         command::PREFLIGHT_REBOOT_SHUTDOWN => return Refusal::denied("preflight_reboot_shutdown_denied"),
         command::DO_GIMBAL_MANAGER_TRACK_RECTANGLE => "do_gimbal_manager_track_rectangle_unsupported",
         command::REQUEST_OPERATOR_CONTROL => "request_operator_control_unsupported",

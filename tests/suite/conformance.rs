@@ -5,6 +5,7 @@ mod codec;
 mod detection;
 mod discovery;
 mod gimbals;
+mod gremsy;
 mod gremsy_by_name;
 mod identity;
 mod manager;

@@ -188,6 +188,7 @@ impl Core {
             flags: CapFlags::HAS_PITCH_AXIS | CapFlags::HAS_YAW_AXIS,
             limits: Default::default(),
             turns: true,
+            operates: false,
         };
         core.say(DriverOutput::Report(Report::Known(Identity::default(), capabilities)));
         let angles =

@@ -14,6 +14,7 @@ mod operations;
 mod steering;
 mod streams;
 mod telling;
+mod vehicle_turn;
 mod writes;
 
 use std::collections::VecDeque;
@@ -48,6 +49,7 @@ use mode_change::ModeChange;
 use mount::Mount;
 use operations::Operations;
 use streams::Streams;
+use vehicle_turn::VehicleTurn;
 
 /// A gimbal not heard for so long is lost: five heartbeats.
 pub const LOST_AFTER: Duration = Duration::from_secs(5);
@@ -103,6 +105,7 @@ pub struct GremsyDriver {
     is_handed_over: bool,
     operations: Operations,
     heard: Heard,
+    vehicle_turn: VehicleTurn,
     negated: Negated,
     effect: EffectWatch,
     faults: Faults,
@@ -161,6 +164,7 @@ impl GremsyDriver {
             is_handed_over: false,
             operations: Operations::default(),
             heard: Heard::default(),
+            vehicle_turn: VehicleTurn::default(),
             negated: settings.negated(),
             effect: EffectWatch::default(),
             faults: Faults::default(),
@@ -293,7 +297,8 @@ impl GremsyDriver {
 
     fn handle_boot_ms(&mut self, now: Timestamp, device: MavId, boot_ms: u32) {
         let before = self.heard.boot_ms.replace(boot_ms);
-        if before.is_some_and(|before| before.wrapping_sub(boot_ms) > REBOOT_STEP_MS && boot_ms < before) {
+        let is_back = before.is_some_and(|before| before.wrapping_sub(boot_ms) > REBOOT_STEP_MS && boot_ms < before);
+        if is_back && self.is_present {
             self.restart(now, device);
             self.heard.boot_ms = Some(boot_ms);
         }
@@ -456,7 +461,8 @@ impl GremsyDriver {
                     }
                 }
                 DriverOutput::Report(Report::Attitude(status)) => self.handle_device_status(now, status),
-                DriverOutput::Report(Report::Restarted) if self.is_alive && !self.is_booting => {
+                // While it is got to know it needs no second beginning.
+                DriverOutput::Report(Report::Restarted) if self.is_present && !self.is_booting => {
                     self.restart(now, device);
                 }
                 DriverOutput::Report(report @ Report::Malformed { .. })

@@ -58,6 +58,7 @@ fn capabilities(settings: &V1Settings) -> Capabilities {
             yaw: AxisLimits::new(degrees(-180.0), degrees(180.0)),
         },
         turns: false,
+        operates: false,
     }
 }
 

@@ -280,19 +280,22 @@ impl Mount {
     pub fn poll_timeout(&self, condition: Condition) -> Option<Timestamp> {
         let wanted = self.wanted?;
         let dead_man = wanted.turns().then(|| self.refreshed + DEAD_MAN);
-        let refused = match self.mode {
-            Mode::Refused(_, at) => Some(at + REFUSED_FOR),
-            _ => None,
-        };
-        let returning = match self.retraction {
-            Retraction::Returning { since } => Some(since + MOTORS_START),
-            _ => None,
+        let waits = match (wanted, self.mode, self.retraction) {
+            _ if wanted.is_stop() => None,
+            _ if !condition.is_ready => return dead_man,
+            (Order::Home | Order::Retract | Order::RadioControl, ..) => return None,
+            (_, _, Retraction::Returning { since }) => Some(since + MOTORS_START),
+            (_, Mode::Refused(_, at), _) => Some(at + REFUSED_FOR),
+            (Order::Point { mode: wanted, .. } | Order::Turn { mode: wanted, .. }, Mode::Is(mode), _)
+                if mode == wanted =>
+            {
+                None
+            }
+            // For the answer.
+            _ => return dead_man,
         };
         let due = self.sent.map(|(at, sent)| at + self.interval(at, sent, wanted, condition));
-        let waits = !condition.is_ready && !wanted.is_stop();
-        let is_once = matches!(wanted, Order::Home | Order::Retract | Order::RadioControl);
-        let due = due.filter(|_| !waits && !is_once && refused.is_none() && returning.is_none());
-        [dead_man, refused, returning, due].into_iter().flatten().min()
+        [dead_man, waits.or(due)].into_iter().flatten().min()
     }
 
     pub fn poll_output(&mut self) -> Option<MountOutput> {

@@ -32,7 +32,7 @@ impl GremsyDriver {
         self.effect.handle_target(pose_of(setpoint).filter(|_| self.is_present));
         match self.search.decided() {
             Some(Generation::V1) => {
-                self.mount.order(now, order_of(setpoint));
+                self.mount.order(now, order_of(self.about_north(now, setpoint)));
                 self.mount.advance(now, device, self.condition());
             }
             Some(Generation::V2) => self.steer_v2(now, device, setpoint, is_stop),
@@ -41,6 +41,18 @@ impl GremsyDriver {
         let is_off = self.heard.status.is_some_and(|(_, status)| !status.motors_on());
         if self.is_present && is_off && !self.is_retracted && !is_stop && !matches!(setpoint, Setpoint::Retract) {
             self.raise(Fault::MotorsOff);
+        }
+    }
+
+    /// "When using Speed Mode, the gimbal moves at the absolute rate in the Earth frame", whatever its mode: a rotation from
+    /// the nose has the vehicle's in it. A stop is one in any frame.
+    fn about_north(&self, now: Timestamp, setpoint: Setpoint) -> Setpoint {
+        match setpoint {
+            Setpoint::Turn(turning) if turning.yaw_frame == YawFrame::Vehicle && !turning.is_zero() => {
+                let of_vehicle = self.vehicle_turn.rate(now).unwrap_or(AngularRate::ZERO);
+                Setpoint::Turn(Turning { yaw: turning.yaw + of_vehicle, ..turning })
+            }
+            setpoint => setpoint,
         }
     }
 

@@ -26,6 +26,7 @@ impl GremsyDriver {
     pub(super) fn handle_orientation(&mut self, now: Timestamp, device: MavId, frame: &Frame<'_>) {
         let Some(orientation) = Orientation::read(frame, self.negated) else { return };
         self.heard.orientation = Some((now, orientation));
+        self.vehicle_turn.handle_heading(now, (orientation.yaw_absolute - orientation.yaw).wrapped());
         if self.search.decided() != Some(Generation::V1) {
             return;
         }
@@ -186,9 +187,9 @@ impl GremsyDriver {
                 let yaw = limits.yaw.filter(|_| !infinite);
                 // "Retract" does work, whatever it is turned into.
                 let flags = told.flags | CapFlags::HAS_RETRACT | CapFlags::HAS_NEUTRAL;
-                Capabilities { flags, limits: Limits { yaw, ..limits }, turns: true }
+                Capabilities { flags, limits: Limits { yaw, ..limits }, turns: true, operates: true }
             }
-            (_, _) => Capabilities { flags: v1_flags(), limits, turns: true },
+            (_, _) => Capabilities { flags: v1_flags(), limits, turns: true, operates: true },
         }
     }
 

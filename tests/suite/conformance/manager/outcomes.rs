@@ -588,5 +588,5 @@ fn capabilities(gimbal: Gimbal) -> Capabilities {
         | CapFlags::HAS_RC_INPUTS;
     let stops = |(min, max)| AxisLimits::new(Angle::from_degrees(min), Angle::from_degrees(max));
     let limits = Limits { roll: None, pitch: stops(PITCH_STOPS), yaw: stops(YAW_STOPS) };
-    Capabilities { flags: if gimbal.full() { plain | rest } else { plain }, limits, turns: true }
+    Capabilities { flags: if gimbal.full() { plain | rest } else { plain }, limits, turns: true, operates: false }
 }

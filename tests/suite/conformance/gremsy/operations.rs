@@ -1,0 +1,366 @@
+//! What is asked of it by its name: every function of the vendor's SDK, in both generations.
+
+use gimbald::geometry::AxisLimits;
+use gimbald::gimbals::gremsy::modes::{self, ControlMode};
+use gimbald::gimbals::gremsy::packet::{self, MessageRate};
+use gimbald::gimbals::operation::{
+    Axis, AxisMotion, EncoderUnit, MotorAxis, MotorControl, Motors, OperationError, RadioType, ResetMode, Stream,
+    StreamRate, YawMode,
+};
+use gimbald::manager::asked::NotDone;
+use gimbald::wire::dialect::{COMMAND_ACK_DATA, MavMessage, PARAM_REQUEST_LIST_DATA};
+
+use super::*;
+use crate::support::world::GIMBAL;
+
+fn controlled(generation: Generation) -> (World, Places) {
+    controlled_with(device(generation))
+}
+
+fn controlled_with(device: DeviceSettings) -> (World, Places) {
+    let (mut world, places) = running_with(device, GremsySettings::default());
+    take_control(&mut world);
+    world.forget();
+    (world, places)
+}
+
+fn failed(error: OperationError) -> Option<Answer> {
+    Some(Err(NotDone::Operation(error)))
+}
+
+/// `set_gimbal_motor`: 31010 in v1; in v2 284 with RETRACT or NEUTRAL until 285 shows it.
+#[test]
+fn motors_off_and_on() {
+    for generation in [Generation::V1, Generation::V2] {
+        let (mut world, places) = controlled(generation);
+        for (motors, on, mode) in [(Motors::Off, false, ControlMode::Off), (Motors::On, true, ControlMode::Reset)] {
+            world.forget();
+            assert_eq!(operate(&mut world, places, Operation::Motors(motors)), Some(Ok(())), "{generation:?} {on}");
+            assert_eq!(seen(&world).details.motors_on, Some(on), "{generation:?}");
+            let (commands, setpoints) = orders(&mut world, places);
+            match generation {
+                Generation::V1 => assert_eq!((commands, setpoints), (vec![packet::set_motors(GIMBAL, on)], vec![])),
+                Generation::V2 => {
+                    assert_eq!(commands, []);
+                    assert_eq!(setpoints[0].flags, modes::set_mode(GIMBAL, mode, Some(YawFrame::Vehicle)).flags);
+                    assert!(setpoints.len() <= 5);
+                }
+            }
+        }
+    }
+}
+
+/// `set_gimbal_lock_mode_sync`, `set_gimbal_follow_mode_sync`: 31011 in v1; in v2 flags until 285 shows them.
+#[test]
+fn lock_and_follow() {
+    for generation in [Generation::V1, Generation::V2] {
+        let (mut world, places) = controlled(generation);
+        for (mode, name) in [(YawMode::Lock, "lock"), (YawMode::Follow, "follow")] {
+            world.forget();
+            assert_eq!(operate(&mut world, places, Operation::SetYawMode(mode)), Some(Ok(())), "{generation:?} {name}");
+            assert_eq!(seen(&world).details.mode.as_deref(), Some(name), "{generation:?}");
+            let (commands, setpoints) = orders(&mut world, places);
+            let command = if mode == YawMode::Lock { packet::lock(GIMBAL) } else { packet::follow(GIMBAL) };
+            match generation {
+                Generation::V1 => assert_eq!((commands, setpoints), (vec![command], vec![])),
+                Generation::V2 => {
+                    assert_eq!(commands, []);
+                    let lock = if mode == YawMode::Lock { 0x1c | 0x40 } else { 0x0c | 0x20 };
+                    assert!(setpoints.iter().all(|setpoint| setpoint.flags == lock), "{setpoints:?}");
+                }
+            }
+        }
+    }
+}
+
+/// Gimbal statement 26: "v2 lock with a silent gimbal returns TIMEOUT after 5 sends within 0.5 ± 0.1 s."
+#[test]
+fn statement_26_a_silent_gimbal_is_told_five_times() {
+    let (mut world, places) = controlled(Generation::V2);
+    world.remove(places.gimbal);
+    let id = OperationId(77);
+    let asked = Asked::Operation(Operation::SetYawMode(YawMode::Lock));
+    world.input(Input::Asked { id, gimbal: "camera", asked: &asked });
+    run(&mut world, places, Duration::from_millis(499));
+    assert_eq!(world.answers.last().map(|(last, _)| *last == id), Some(false));
+    run(&mut world, places, Duration::from_millis(1));
+    assert_eq!(world.answers.last(), Some(&(id, Err(NotDone::Operation(OperationError::NoAnswer)))));
+    assert_eq!(orders(&mut world, places).1.len(), 5);
+}
+
+/// `set_gimbal_reset_mode`, and mapping.
+#[test]
+#[rustfmt::skip]
+fn resets_turn_it_where_they_say() {
+    for (operation,                                        v1,                                   looks) in [
+        (Operation::Reset(ResetMode::Yaw),                 packet::ResetMode::Yaw,               (-30.0, 0.0)),
+        (Operation::Reset(ResetMode::PitchAndYaw),         packet::ResetMode::PitchAndYaw,       (0.0, 0.0)),
+        (Operation::Reset(ResetMode::PitchDownUpAndYaw),   packet::ResetMode::PitchDownUpAndYaw, (-90.0, 0.0)),
+        (Operation::Reset(ResetMode::PitchDownUp),         packet::ResetMode::PitchDownUp,       (-90.0, 45.0)),
+        (Operation::Reset(ResetMode::PitchMapping),        packet::ResetMode::PitchMapping,      (-90.0, 45.0)),
+        (Operation::Mapping,                               packet::ResetMode::PitchMapping,      (-90.0, 45.0)),
+    ] {
+        for generation in [Generation::V1, Generation::V2] {
+            let (mut world, places) = controlled(generation);
+            point(&mut world, -30.0, 45.0);
+            run(&mut world, places, 5 * SECOND);
+            world.forget();
+            assert_eq!(operate(&mut world, places, operation.clone()), Some(Ok(())), "{generation:?} {operation:?}");
+            let (pitch, yaw) = super::looks(&world);
+            let off = (pitch - looks.0).abs().max((yaw - looks.1).abs());
+            assert!(off < 2.0, "{generation:?} {operation:?}: {pitch:.1} {yaw:.1}");
+            let (commands, setpoints) = orders(&mut world, places);
+            match generation {
+                Generation::V1 => assert_eq!((commands, setpoints), (vec![packet::reset(GIMBAL, v1)], vec![])),
+                Generation::V2 => assert!(commands.is_empty() && (1..=5).contains(&setpoints.len()), "{setpoints:?}"),
+            }
+        }
+    }
+}
+
+/// What turns is stopped before anything else takes its place.
+#[test]
+fn an_operation_stops_what_turns() {
+    for generation in [Generation::V1, Generation::V2] {
+        let (mut world, places) = controlled(generation);
+        let rate = gimbald::geometry::AngularRate::from_degrees_per_second;
+        let turn = Asked::Turn { roll: None, pitch: rate(0.0), yaw: rate(15.0), yaw_frame: YawFrame::Vehicle };
+        world.input(Input::Asked { id: OperationId(5), gimbal: "camera", asked: &turn });
+        run(&mut world, places, SECOND);
+        assert_eq!(operate(&mut world, places, Operation::Reset(ResetMode::PitchAndYaw)), Some(Ok(())));
+        assert_looks(&world, 0.0, 0.0);
+        run(&mut world, places, 5 * SECOND);
+        assert_looks(&world, 0.0, 0.0);
+    }
+}
+
+/// `set_gimbal_rc_input_sync`: 204 with p1 = 3; the next demand takes it back.
+#[test]
+fn radio_control_has_it_until_the_next_demand() {
+    for generation in [Generation::V1, Generation::V2] {
+        let (mut world, places) = controlled(generation);
+        assert_eq!(operate(&mut world, places, Operation::RadioControl), Some(Ok(())), "{generation:?}");
+        assert_eq!(orders(&mut world, places), (vec![packet::hand_to_rc(GIMBAL)], vec![]));
+    }
+}
+
+/// `set_msg_encoder_rate` and the others; gimbal statement 18: "set_msg rate 50 Hz yields p2 = 20000; −1 and 0 are passed
+/// unchanged."
+#[test]
+#[rustfmt::skip]
+fn statement_18_stream_rates() {
+    let (mut world, places) = controlled(Generation::V2);
+    for (stream,                   rate,                    id,    interval,   vendor) in [
+        (Stream::Encoders,         StreamRate::Hertz(50),   158.0, 20_000.0,   MessageRate::Hertz(50)),
+        (Stream::MountOrientation, StreamRate::Hertz(10),   265.0, 100_000.0,  MessageRate::Hertz(10)),
+        (Stream::AttitudeStatus,   StreamRate::Hertz(30),   285.0, 33_333.0,   MessageRate::Hertz(30)),
+        (Stream::RawImu,           StreamRate::Off,         27.0,  -1.0,       MessageRate::Off),
+        (Stream::RawImu,           StreamRate::Default,     27.0,  0.0,        MessageRate::Default),
+        (Stream::RawImu,           StreamRate::Hertz(20),   27.0,  50_000.0,   MessageRate::Hertz(20)),
+    ] {
+        world.forget();
+        assert_eq!(operate(&mut world, places, Operation::SetStreamRate { stream, rate }), Some(Ok(())), "{stream:?}");
+        let sent = told(&mut world, places, command::SET_MESSAGE_INTERVAL).remove(0);
+        assert_eq!((sent.param1, sent.param2), (id, interval), "{stream:?}");
+        assert_eq!(sent, packet::set_message_rate(GIMBAL, id as u32, vendor));
+    }
+    let imu = seen(&world).details.imu.expect("it is sent");
+    assert!((imu.acceleration_g[2] - 1.0).abs() < 0.01 && imu.age_ms < 100, "{imu:?}");
+    let streams = seen(&world).details.streams;
+    assert_eq!(streams["raw_imu"].wanted_hz, Some(20.0));
+    assert!((streams["attitude_status"].measured_hz.expect("it comes") - 30.0).abs() < 2.0, "{streams:?}");
+    let invalid = Operation::SetStreamRate { stream: Stream::RawImu, rate: StreamRate::Hertz(0) };
+    assert_eq!(operate(&mut world, places, invalid), failed(OperationError::Invalid("a rate is 1 to 200 times a second".to_owned())));
+    // A v1 gimbal has no 285.
+    let (mut world, places) = controlled(Generation::V1);
+    let attitude = Operation::SetStreamRate { stream: Stream::AttitudeStatus, rate: StreamRate::Hertz(10) };
+    assert_eq!(operate(&mut world, places, attitude), failed(OperationError::UnsupportedByDevice));
+}
+
+/// `request_gimbal_device_info`, and all parameters once more.
+#[test]
+fn it_is_asked_once_more() {
+    let (mut world, places) = controlled(Generation::V2);
+    assert_eq!(operate(&mut world, places, Operation::RequestInformation), Some(Ok(())));
+    assert_eq!(told(&mut world, places, command::REQUEST_MESSAGE), [packet::request_message(GIMBAL, 283)]);
+    assert_eq!(operate(&mut world, places, Operation::RefreshParameters), Some(Ok(())));
+    let lists: Vec<PARAM_REQUEST_LIST_DATA> = from_manager(&mut world, places);
+    assert_eq!(lists.len(), 1);
+}
+
+/// `set_gimbal_config_…_axis`, `set_gimbal_motor_control`, `set_rc_type`, `set_gimbal_encoder_type_send`,
+/// `set_gimbal_combine_attitude`, `set_gimbal_return_home_when_change_mode`, `set_limit_angle_…`: written, told back, and seen.
+/// Gimbal statements 15 and 16: "reading back gives −90…+45", "un-negated (profile-dependent) and round-trip".
+#[test]
+#[rustfmt::skip]
+fn settings_are_written_and_read_back() {
+    let degrees = Angle::from_degrees;
+    let limits = |min, max| AxisLimits::new(degrees(min), degrees(max)).expect("in order");
+    let motion = AxisMotion {
+        control_speed_dps: Some(45.0),
+        control_smoothing: Some(70.0),
+        follow_speed: Some(50.0),
+        follow_smoothing: Some(30.0),
+        follow_window_deg: Some(8.0),
+        reversed: Some(true),
+    };
+    let motors = MotorControl {
+        tilt: MotorAxis { stiffness: Some(25.0), hold_strength: Some(35.0) },
+        gyro_filter: Some(3.0),
+        output_filter: Some(2.0),
+        ..MotorControl::default()
+    };
+    let settings = [
+        Operation::SetLimits { axis: Axis::Tilt, limits: limits(-80.0, 30.0) },
+        Operation::SetLimits { axis: Axis::Roll, limits: limits(-20.0, 20.0) },
+        Operation::SetLimits { axis: Axis::Pan, limits: limits(-100.0, 120.0) },
+        Operation::SetAxisMotion { axis: Axis::Pan, motion },
+        Operation::SetMotorControl(motors),
+        Operation::SetEncoderUnit(EncoderUnit::Angles),
+        Operation::SetCombinedAttitude(true),
+        Operation::SetHomeOnModeChange(true),
+    ];
+    for device in [device(Generation::V1), device(Generation::V2), with_firmware(Generation::V1, 7, 5, 6)] {
+        let firmware = device.firmware;
+        let (mut world, places) = controlled_with(device);
+        for operation in &settings {
+            assert_eq!(operate(&mut world, places, operation.clone()), Some(Ok(())), "{firmware} {operation:?}");
+        }
+        let is_old = firmware.y < 7;
+        let sets = sets(&mut world, places);
+        let written = |name: &str| sets.iter().rev().find(|(written, _)| written == name).map(|(_, value)| *value);
+        let (tilt, bits) = if is_old { (["TRAVEL_MIN_PIT", "TRAVEL_MAX_PIT"], "JOY_AXIS") } else { (["RC_LIM_MIN_TILT", "RC_LIM_MAX_TILT"], "RC_REVERSE_AXIS") };
+        let expected = if is_old { [-80.0, 30.0] } else { [-30.0, 80.0] };
+        assert_eq!(tilt.map(written), expected.map(Some), "{firmware}");
+        assert_eq!(written(bits), Some(f32::from(0x02_u8 | 0x08 | 0x10)), "{firmware}");
+
+        let details = seen(&world).details;
+        let (tilt, pan) = (&details.axes["tilt"], &details.axes["pan"]);
+        assert_eq!((tilt.min_deg, tilt.max_deg, tilt.stiffness, tilt.hold_strength), (Some(-80.0), Some(30.0), Some(25.0), Some(35.0)));
+        assert_eq!((pan.min_deg, pan.max_deg, pan.reversed), (Some(-100.0), Some(120.0), Some(true)));
+        assert_eq!((pan.control_speed_dps, pan.control_smoothing, pan.follow_speed), (Some(45.0), Some(70.0), Some(50.0)));
+        assert_eq!((pan.follow_smoothing, pan.follow_window_deg), (Some(30.0), Some(8.0)));
+        assert_eq!((details.gyro_filter, details.output_filter), (Some(3.0), Some(2.0)));
+        assert_eq!((details.combined_attitude, details.home_on_mode_change), (Some(true), Some(true)));
+        assert_eq!(details.encoder_unit.as_deref(), Some("angles"));
+        // What it is told from then on stays within.
+        point(&mut world, -90.0, 0.0);
+        run(&mut world, places, 5 * SECOND);
+        assert_looks(&world, -80.0, 0.0);
+    }
+}
+
+/// A single parameter by its name, and what the gimbal does not take.
+#[test]
+fn a_parameter_by_its_name() {
+    let (mut world, places) = controlled(Generation::V1);
+    let set = |name: &str, value| Operation::SetParameter { name: name.to_owned(), value };
+    assert_eq!(operate(&mut world, places, set("GYRO_LPF", 6.0)), Some(Ok(())));
+    assert_eq!(seen(&world).details.parameters["GYRO_LPF"], 6.0);
+    assert_eq!(
+        operate(&mut world, places, set("MAV_TS_ENCNT", 5.0)),
+        failed(OperationError::NoEffect("MAV_TS_ENCNT is 1".to_owned()))
+    );
+    assert_eq!(operate(&mut world, places, set("NO_SUCH_NAME", 5.0)), failed(OperationError::NoAnswer));
+    assert_eq!(operate(&mut world, places, Operation::SetRadioType(RadioType::Herelink)), Some(Ok(())));
+    assert_eq!(seen(&world).details.radio_type.as_deref(), Some("herelink"));
+}
+
+/// What a ground station sets passes through, and is known here: the daemon's own parameters do not stand in its way.
+#[test]
+fn what_a_ground_station_sets_is_known() {
+    use crate::support::world::heartbeat;
+    use gimbald::wire::dialect::{CharArray, PARAM_SET_DATA, PARAM_VALUE_DATA};
+    let (mut world, places) = running(Generation::V1);
+    world.send(places.ground, GCS, &heartbeat(6, 8));
+    let set = PARAM_SET_DATA {
+        param_value: 9.0,
+        target_system: 1,
+        target_component: 154,
+        param_id: CharArray::from("GYRO_LPF"),
+        param_type: 4,
+    };
+    world.send(places.ground, GCS, &MavMessage::PARAM_SET(set));
+    run(&mut world, places, SECOND);
+    assert_eq!(seen(&world).details.parameters["GYRO_LPF"], 9.0);
+    assert_eq!(sets(&mut world, places), []);
+    let echoes: Vec<PARAM_VALUE_DATA> = crate::support::script::of(&world.take(places.ground));
+    assert_eq!(echoes.iter().filter(|echo| echo.param_value == 9.0).count(), 1);
+}
+
+/// Gimbal statement 7: "A lost ACK leads to re-sends with confirmation 1 and 2 and success if the third is acknowledged." 8:
+/// "An ACK with target 0/0 is accepted; one with target 2/191 is ignored." 9: "ACK DENIED, TEMPORARILY_REJECTED, UNSUPPORTED
+/// and FAILED give four distinguishable driver errors." 10: "IN_PROGRESS keeps the request open and a following ACCEPTED
+/// completes it."
+#[test]
+#[rustfmt::skip]
+fn statements_7_to_10_answers_of_the_gimbal() {
+    let after_the_third = Duration::from_millis(1_100);
+    let at_once = Duration::from_millis(50);
+    for (after,           target,   results,        expected,                                       sent) in [
+        (after_the_third, (1, 191), &[0][..],       Some(Ok(())),                                   3),
+        (at_once,         (0, 0),   &[0],           Some(Ok(())),                                   1),
+        (at_once,         (2, 191), &[0],           failed(OperationError::NoAnswer),               3),
+        (at_once,         (1, 191), &[2],           failed(OperationError::Denied),                 1),
+        (at_once,         (1, 191), &[1],           failed(OperationError::Rejected),               1),
+        (at_once,         (1, 191), &[3],           failed(OperationError::UnsupportedByDevice),    1),
+        (at_once,         (1, 191), &[4],           failed(OperationError::Failed),                 1),
+        (at_once,         (1, 191), &[5, 0],        Some(Ok(())),                                   1),
+        (at_once,         (1, 191), &[5],           failed(OperationError::NoAnswer),               1),
+    ] {
+        let (mut world, places) = controlled(Generation::V1);
+        world.remove(places.gimbal);
+        let id = OperationId(77);
+        let asked = Asked::Operation(Operation::RequestInformation);
+        world.input(Input::Asked { id, gimbal: "camera", asked: &asked });
+        run(&mut world, places, after);
+        for result in results {
+            let (target_system, target_component) = target;
+            let ack = COMMAND_ACK_DATA {
+                command: command::REQUEST_MESSAGE,
+                result: *result,
+                progress: 0,
+                result_param2: 0,
+                target_system,
+                target_component,
+            };
+            world.send(places.gimbal, GIMBAL, &MavMessage::COMMAND_ACK(ack));
+            run(&mut world, places, at_once);
+        }
+        for _ in 0..16 {
+            // It beats, so it is not lost meanwhile.
+            world.send(places.gimbal, GIMBAL, &crate::support::world::heartbeat(26, 8));
+            run(&mut world, places, Duration::from_millis(500));
+        }
+        let answer = world.answers.iter().find(|(answered, _)| *answered == id).map(|(_, answer)| answer.clone());
+        assert_eq!(answer, expected, "{target:?} {results:?}");
+        let commands = told(&mut world, places, command::REQUEST_MESSAGE);
+        let confirmations: Vec<u8> = commands.iter().map(|command| command.confirmation).collect();
+        assert_eq!(confirmations, (0..sent).collect::<Vec<u8>>(), "{target:?} {results:?}");
+    }
+}
+
+/// Nothing of it is done for a gimbal that is not there.
+#[test]
+fn a_gimbal_that_is_gone_does_nothing() {
+    let (mut world, places) = controlled(Generation::V1);
+    world.remove(places.gimbal);
+    run(&mut world, places, 6 * SECOND);
+    assert_eq!(seen(&world).state, "lost");
+    assert_eq!(operate(&mut world, places, Operation::RefreshParameters), failed(OperationError::NotThere));
+}
+
+/// A demand that comes while a mode is being changed goes first.
+#[test]
+fn a_demand_ends_what_is_being_changed() {
+    let (mut world, places) = controlled(Generation::V2);
+    world.remove(places.gimbal);
+    let asked = Asked::Operation(Operation::SetYawMode(YawMode::Lock));
+    world.input(Input::Asked { id: OperationId(77), gimbal: "camera", asked: &asked });
+    point(&mut world, -20.0, 0.0);
+    let text = "another demand took its place".to_owned();
+    assert_eq!(
+        world.answers.iter().find(|(id, _)| *id == OperationId(77)).map(|(_, answer)| answer.clone()),
+        failed(OperationError::NoEffect(text))
+    );
+}

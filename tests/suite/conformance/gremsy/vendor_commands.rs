@@ -1,0 +1,176 @@
+//! Commands of the maker's own over MAVLink: motors (31010), modes and resets (31011), restarts (246).
+
+use gimbald::bridge::Input;
+use gimbald::gimbals::gremsy::packet;
+use gimbald::wire::MavId;
+use gimbald::wire::dialect::COMMAND_ACK_DATA;
+
+use super::*;
+use crate::support::script::{ACCEPTED, DENIED, NAN, again, of, to};
+use crate::support::world::{AUTOPILOT, GIMBAL};
+
+const IN_PROGRESS: u8 = 5;
+const SCRIPT: MavId = MavId::new(245, 191);
+
+/// Primary control for the ground station.
+fn claim(world: &mut World, places: Places) {
+    let take = command_long(MANAGER, 1001, &[-2.0, -2.0, -1.0, -1.0, 0.0, 0.0, 0.0]);
+    assert_eq!(world.result_of(places.ground, GCS, &take), Some(ACCEPTED));
+}
+
+/// What a command is answered, one answer after the other.
+fn answers(world: &mut World, places: Places, sender: MavId, number: u16, params: &[f32]) -> Vec<u8> {
+    world.take(places.ground);
+    world.send(places.ground, sender, &command_long(MANAGER, number, params));
+    run(world, places, 8 * SECOND);
+    let acks: Vec<COMMAND_ACK_DATA> = of(&world.take(places.ground));
+    acks.into_iter().filter(|ack| ack.command == number).map(|ack| ack.result).collect()
+}
+
+/// "Motors on and off, lock, follow, reset modes, reboot … MAVLink where the protocol has a way": each is begun, done by
+/// the gimbal, and answered when it is.
+#[test]
+#[rustfmt::skip]
+fn each_command_does_what_the_maker_says() {
+    let v1 = |command: COMMAND_LONG_DATA| Some(command);
+    for (number, params,                                      on_v1) in [
+        (31010,  [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],         v1(packet::set_motors(GIMBAL, true))),
+        (31010,  [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],         v1(packet::set_motors(GIMBAL, false))),
+        (31011,  [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 4.0],         v1(packet::reset(GIMBAL, packet::ResetMode::Yaw))),
+        (31011,  [0.0, 0.0, 0.0, 0.0, 0.0, 3.0, 4.0],         v1(packet::reset(GIMBAL, packet::ResetMode::PitchAndYaw))),
+        (31011,  [0.0, 0.0, 0.0, 0.0, 0.0, 11.0, 4.0],        v1(packet::reset(GIMBAL, packet::ResetMode::PitchDownUpAndYaw))),
+        (31011,  [0.0, 0.0, 0.0, 0.0, 0.0, 12.0, 4.0],        v1(packet::reset(GIMBAL, packet::ResetMode::PitchDownUp))),
+        (31011,  [0.0, 0.0, 0.0, 0.0, 0.0, 13.0, 4.0],        v1(packet::reset(GIMBAL, packet::ResetMode::PitchMapping))),
+        (246,    [0.0, 0.0, 1.0, 154.0, 0.0, 0.0, 0.0],       v1(packet::reboot(GIMBAL))),
+        (246,    [0.0, 0.0, 2.0, 154.0, 0.0, 0.0, 0.0],       v1(packet::reboot_or_shutdown(GIMBAL, packet::RebootAction::Shutdown))),
+    ] {
+        for generation in [Generation::V1, Generation::V2] {
+            let (mut world, places) = running(generation);
+            claim(&mut world, places);
+            let results = answers(&mut world, places, GCS, number, &params);
+            assert_eq!(results, [IN_PROGRESS, ACCEPTED], "{generation:?} {number} {params:?}");
+            if let (Some(expected), Generation::V1) = (&on_v1, generation) {
+                let (commands, _) = orders(&mut world, places);
+                assert_eq!(&commands[0], expected);
+            }
+        }
+    }
+}
+
+/// Lock and follow are demands like any other: it stays, and keeps yaw to North or to the nose.
+#[test]
+fn lock_and_follow_are_demands() {
+    for generation in [Generation::V1, Generation::V2] {
+        let (mut world, places) = running(generation);
+        assert_eq!(answers(&mut world, places, GCS, 31011, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]), [ACCEPTED]);
+        assert!(seen(&world).flags.iter().any(|flag| flag == "yaw_lock"), "{generation:?}");
+        assert_eq!(answers(&mut world, places, GCS, 31011, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0]), [ACCEPTED]);
+        assert!(!seen(&world).flags.iter().any(|flag| flag == "yaw_lock"), "{generation:?}");
+    }
+}
+
+/// Protocol checklist 138: "When 246 arrives with p4 = 0, the daemon does not reboot." Nor does the gimbal: only one that
+/// names it is for it, and what has no meaning is denied.
+#[test]
+#[rustfmt::skip]
+fn item_138_a_restart_that_names_no_gimbal_restarts_nothing() {
+    let (mut world, places) = running(Generation::V1);
+    claim(&mut world, places);
+    world.forget();
+    for (number, params) in [
+        (246,    [0.0; 7]),
+        (246,    [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        (246,    [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]),
+        (246,    [0.0, 0.0, 0.0, 154.0, 0.0, 0.0, 0.0]),
+        (246,    [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]),
+        (246,    [0.0, 0.0, 1.0, 171.0, 0.0, 0.0, 0.0]),
+        (246,    [NAN; 7]),
+        (31010,  [NAN; 7]),
+        (31010,  [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0]),
+        (31011,  [0.0; 7]),
+        (31011,  [0.0, 0.0, 0.0, 0.0, 0.0, 2.0, 4.0]),
+        (31011,  [NAN; 7]),
+    ] {
+        assert_eq!(answers(&mut world, places, GCS, number, &params), [DENIED], "{number} {params:?}");
+    }
+    assert_eq!(orders(&mut world, places), (vec![], vec![]));
+}
+
+/// "Dangerous ones (motors off, reboot) need … the holder's right"; all of them pass the gate.
+#[test]
+#[rustfmt::skip]
+fn they_pass_the_gate_and_dangerous_ones_are_the_holders() {
+    let off = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    let home = [0.0, 0.0, 0.0, 0.0, 0.0, 3.0, 4.0];
+    let reboot = [0.0, 0.0, 1.0, 154.0, 0.0, 0.0, 0.0];
+    let (mut world, places) = running(Generation::V1);
+    // Nobody has control: everybody may steer, and nobody may cut the motors.
+    for (number, params, expected) in [(31010, off, vec![DENIED]), (246, reboot, vec![DENIED]), (31011, home, vec![IN_PROGRESS, ACCEPTED])] {
+        assert_eq!(answers(&mut world, places, GCS, number, &params), expected, "{number}");
+    }
+    claim(&mut world, places);
+    world.forget();
+    for (number, params) in [(31010, off), (246, reboot), (31011, home)] {
+        assert_eq!(answers(&mut world, places, SCRIPT, number, &params), [DENIED], "{number}");
+    }
+    assert_eq!(orders(&mut world, places), (vec![], vec![]));
+}
+
+/// A command that is said again because its answer is slow is done once.
+#[test]
+fn a_repeat_is_done_once() {
+    let (mut world, places) = running(Generation::V1);
+    claim(&mut world, places);
+    world.forget();
+    let off = command_long(MANAGER, 31010, &[0.0; 7]);
+    for confirmation in 0..3 {
+        world.send(places.ground, GCS, &again(confirmation, off.clone()));
+    }
+    run(&mut world, places, 8 * SECOND);
+    let acks: Vec<COMMAND_ACK_DATA> = of(&world.take(places.ground));
+    let results: Vec<u8> = acks.iter().filter(|ack| ack.command == 31010).map(|ack| ack.result).collect();
+    assert_eq!(results, [IN_PROGRESS, IN_PROGRESS, IN_PROGRESS, ACCEPTED]);
+    assert_eq!(told(&mut world, places, 31010).len(), 1);
+}
+
+/// A gimbal that does not answer is said to have failed, once.
+#[test]
+fn a_gimbal_that_does_not_answer_has_failed() {
+    let (mut world, places) = running(Generation::V1);
+    world.remove(places.gimbal);
+    let results = answers(&mut world, places, GCS, 31011, &[0.0, 0.0, 0.0, 0.0, 0.0, 3.0, 4.0]);
+    assert_eq!(results, [IN_PROGRESS, 4]);
+}
+
+/// The same straight to a managed gimbal are kept away, as mount commands are (`docs/routing.md`, R15); with
+/// `firewall = "warn"` they pass.
+#[test]
+fn what_others_send_straight_to_it_is_kept_away() {
+    use gimbald::manager::settings::{ControlSettings, Firewall};
+    for firewall in [Firewall::On, Firewall::Warn] {
+        let gimbal = GimbalSettings { family: Family::Gremsy, ..GimbalSettings::found("camera".to_owned()) };
+        let control = ControlSettings { firewall, ..ControlSettings::default() };
+        let (mut world, places) = World::empty(Settings { gimbals: vec![gimbal], control, ..three_links() });
+        world.install(places.gimbal, Device::new(Timestamp::ZERO, device(Generation::V1)));
+        run(&mut world, places, 12 * SECOND);
+        world.forget();
+        for (number, params) in [
+            (31010, [0.0; 7]),
+            (31011, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
+            (246, [0.0, 0.0, 1.0, 154.0, 0.0, 0.0, 0.0]),
+            (246, [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]),
+        ] {
+            for (place, sender) in [(places.ground, GCS), (places.autopilot, AUTOPILOT)] {
+                for target in [GIMBAL, MavId::new(1, 0), MavId::new(0, 0)] {
+                    world.input(Input::LinkUp { link: 0 });
+                    world.send(place, sender, &to(target, command_long(MANAGER, number, &params)));
+                }
+            }
+        }
+        let foreign = world
+            .arrivals(places.gimbal)
+            .iter()
+            .filter(|arrival| matches!(arrival.source(), GCS | AUTOPILOT) && matches!(arrival.id(), 75 | 76));
+        assert_eq!(foreign.count() > 0, firewall == Firewall::Warn, "{firewall:?}");
+    }
+}
