@@ -340,6 +340,28 @@ fn statements_7_to_10_answers_of_the_gimbal() {
     }
 }
 
+/// `get_gimbal_status`, `get_gimbal_timestamps`, `get_gimbal_version` and the rest of what the SDK reads.
+#[test]
+fn what_it_tells_is_shown() {
+    for (generation, version) in [(Generation::V1, "7.7.3"), (Generation::V2, "7.8.9")] {
+        let (world, _) = running(generation);
+        let details = seen(&world).details;
+        assert_eq!(details.version.as_deref(), Some(version));
+        assert_eq!(details.operation.as_deref(), Some("on, follow"));
+        assert_eq!((details.motors_on, details.mode.as_deref()), (Some(true), Some("follow")));
+        assert_eq!((details.battery_v, details.load_percent), (Some(14.8), Some(42.0)));
+        assert_eq!((details.not_aligned, details.faults), (vec![], vec![]));
+        assert_eq!(details.radio_type.as_deref(), Some("sync"));
+        let ages = &details.message_ages_ms;
+        assert!(ages["HEARTBEAT"] <= 1_100 && ages["SYS_STATUS"] <= 1_100 && ages["MOUNT_STATUS"] <= 300, "{ages:?}");
+        let attitude = match generation {
+            Generation::V1 => "MOUNT_ORIENTATION",
+            Generation::V2 => "GIMBAL_DEVICE_ATTITUDE_STATUS",
+        };
+        assert!(ages[attitude] <= 150, "{ages:?}");
+    }
+}
+
 /// Nothing of it is done for a gimbal that is not there.
 #[test]
 fn a_gimbal_that_is_gone_does_nothing() {
