@@ -3,7 +3,7 @@
 use std::fmt;
 use std::fs::{File, OpenOptions};
 use std::hint::black_box;
-use std::io::{self, Read};
+use std::io::{self, Read, Write};
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::Path;
 
@@ -69,6 +69,19 @@ impl Token {
         }
         let text = std::str::from_utf8(text).map_err(|_| TokenError::Malformed)?;
         text.parse()
+    }
+
+    /// A word that nobody can guess.
+    pub fn random() -> io::Result<Self> {
+        let mut bytes = [0; 16];
+        File::open("/dev/urandom")?.read_exact(&mut bytes)?;
+        Ok(Self(bytes.iter().map(|byte| format!("{byte:02x}")).collect()))
+    }
+
+    /// Writes it where nothing is yet, for its owner only.
+    pub fn write(&self, path: &Path) -> io::Result<()> {
+        let mut file = OpenOptions::new().write(true).create_new(true).mode(0o600).open(path)?;
+        writeln!(file, "{}", self.0)
     }
 
     /// Whether `given` is this token. How long it takes does not depend on how much of it is right.
@@ -149,6 +162,17 @@ mod tests {
         assert!(error.starts_with("cannot be read: No such file"), "{error}");
         nix::unistd::mkfifo(&path, nix::sys::stat::Mode::S_IRUSR).expect("a writable folder");
         assert_eq!(Token::read_guarded(&path).expect_err("a FIFO").to_string(), "is no regular file");
+    }
+
+    #[test]
+    fn a_random_token_is_written_for_its_owner_only() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("token");
+        let token = Token::random().expect("random bytes");
+        token.write(&path).expect("a writable folder");
+        assert_eq!(Token::read_guarded(&path).expect("it is guarded"), token);
+        assert_ne!(Token::random().expect("random bytes"), token);
+        assert!(token.write(&path).is_err(), "what is there stays");
     }
 
     #[test]

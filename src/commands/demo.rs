@@ -3,8 +3,11 @@
 //! Vehicle and gimbal are peers of their own on real links, a UDP socket and a pseudo-terminal; between them runs the
 //! daemon as it always does.
 
+use std::env;
+use std::fs;
 use std::io::{self, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, UdpSocket};
+use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Duration;
 
@@ -28,6 +31,7 @@ use crate::sim::peer::Peer;
 use crate::sim::pty::Pty;
 use crate::sim::vehicle::{Vehicle, VehicleSettings};
 use crate::timestamp::Timestamp;
+use crate::token::Token;
 
 /// Where a second client may connect.
 const CLIENT: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 14551);
@@ -51,6 +55,8 @@ enum DemoError {
     Pty(#[source] io::Error),
     #[error("no UDP port for the vehicle")]
     Port(#[source] io::Error),
+    #[error("no token for control over HTTP can be kept among the temporary files")]
+    Token(#[source] io::Error),
     #[error("no thread for a simulated peer")]
     Thread(#[source] io::Error),
     #[error(transparent)]
@@ -82,7 +88,9 @@ fn run(arguments: &DemoArgs, output: &mut impl Write) -> Result<(), DemoError> {
     let cable = Pty::open().map_err(DemoError::Pty)?;
     let path = cable.path().map_err(DemoError::Pty)?.to_string_lossy().into_owned();
     let autopilot = free_port().map_err(DemoError::Port)?;
-    let settings = daemon_settings(arguments, Endpoint::Serial { path, baud: GIMBAL_BAUD }, autopilot);
+    let token_file = TokenFile::new().map_err(DemoError::Token)?;
+    let gimbal = Endpoint::Serial { path, baud: GIMBAL_BAUD };
+    let settings = daemon_settings(arguments, gimbal, autopilot, token_file.token.clone());
 
     let vehicle = VehicleSettings { unix_time_us: unix_time_us(), ..VehicleSettings::default() };
     let vehicle = Simulation::start("vehicle", Vehicle::new(Timestamp::ZERO, vehicle), move || {
@@ -106,7 +114,7 @@ fn run(arguments: &DemoArgs, output: &mut impl Write) -> Result<(), DemoError> {
         end_after(Duration::from_secs(u64::from(seconds))).map_err(DemoError::Thread)?;
     }
     // The demo goes on when nobody reads what it says.
-    let _ = write!(output, "{}", instructions(arguments, &settings)).and_then(|()| output.flush());
+    let _ = write!(output, "{}", instructions(arguments, &settings, &token_file.path)).and_then(|()| output.flush());
 
     let result = supervisor::run(settings);
     vehicle.end();
@@ -114,7 +122,7 @@ fn run(arguments: &DemoArgs, output: &mut impl Write) -> Result<(), DemoError> {
     Ok(result?)
 }
 
-fn daemon_settings(arguments: &DemoArgs, gimbal: Endpoint, autopilot: SocketAddr) -> DaemonSettings {
+fn daemon_settings(arguments: &DemoArgs, gimbal: Endpoint, autopilot: SocketAddr, token: Token) -> DaemonSettings {
     let all = [
         ("gimbal", Role::Gimbal, gimbal),
         ("autopilot", Role::Autopilot, Endpoint::UdpIn(autopilot)),
@@ -132,13 +140,18 @@ fn daemon_settings(arguments: &DemoArgs, gimbal: Endpoint, autopilot: SocketAddr
     DaemonSettings {
         core: Settings { links, gimbals, ..Settings::default() },
         endpoints: all.into_iter().map(|(_, _, endpoint)| endpoint).collect(),
-        http: Some(HttpSettings { listen: arguments.http, token: None }),
+        http: Some(HttpSettings { listen: arguments.http, token: Some(token) }),
         // A simulated vehicle's id is not worth keeping.
         directories: Directories::default(),
     }
 }
 
-fn instructions(arguments: &DemoArgs, settings: &DaemonSettings) -> String {
+fn instructions(arguments: &DemoArgs, settings: &DaemonSettings, token_file: &Path) -> String {
+    let name = settings.core.gimbals.first().map_or("gimbal-154", |gimbal| gimbal.name.as_str());
+    let url = match arguments.http {
+        HttpSettings::DEFAULT_LISTEN => String::new(),
+        other => format!(" --url http://{other}"),
+    };
     let listed: Vec<_> =
         settings.core.links.iter().map(|link| format!("    {:<10} {}", link.name, link.endpoint)).collect();
     format!(
@@ -149,6 +162,7 @@ gimbald demo: a simulated vehicle and gimbal, and the daemon between them
   QGroundControl   start it; the vehicle appears by itself ({})
   MAVSDK           connection udpout://{CLIENT}
   MAVProxy         mavproxy.py --master=udpout:{CLIENT}, then: module load camera; camera set manager_component 191
+  Command line     gimbald gimbal {name} point --pitch-deg -30 --token-file {}{url}
 
   Links
 {}
@@ -157,8 +171,33 @@ Ctrl-C ends it.
 ",
         arguments.http,
         arguments.ground,
+        token_file.display(),
         listed.join("\n"),
     )
+}
+
+/// The token of this demo, in a file that ends with it.
+struct TokenFile {
+    token: Token,
+    path: PathBuf,
+}
+
+impl TokenFile {
+    fn new() -> io::Result<Self> {
+        let token = Token::random()?;
+        // Part of another, so that the name cannot be taken before.
+        let name: String = Token::random()?.reveal().chars().take(8).collect();
+        let path = env::temp_dir().join(format!("gimbald-demo-{name}"));
+        token.write(&path)?;
+        Ok(Self { token, path })
+    }
+}
+
+impl Drop for TokenFile {
+    fn drop(&mut self) {
+        // It is worth nothing any more.
+        let _ = fs::remove_file(&self.path);
+    }
 }
 
 /// A UDP port on the loopback that nobody has at the moment.

@@ -279,8 +279,10 @@ mod tests {
 
     use super::super::window::CoreHandle;
     use super::*;
-    use crate::bridge::settings::{LinkSettings, Role, Settings, Transport};
+    use crate::bridge::settings::{LinkSettings, Role, Settings, SystemId, Transport};
     use crate::endpoint::Endpoint;
+    use crate::gimbals::settings::GimbalSettings;
+    use crate::manager::asked::{Asked, NotDone};
     use crate::wire::dialect::STATUSTEXT_DATA;
     use crate::wire::{MavId, encode_to_vec};
 
@@ -297,7 +299,12 @@ mod tests {
             speaks_first: true,
             max_rates: Default::default(),
         });
-        let settings = Settings { links: links.into(), ..Settings::default() };
+        let settings = Settings {
+            system_id: SystemId::Fixed(1),
+            links: links.into(),
+            gimbals: vec![GimbalSettings::found("camera".to_owned())],
+            ..Settings::default()
+        };
         let (requests, received_requests) = mpsc::channel(16);
         let (published, snapshots) = watch::channel(Arc::new(Snapshot::default()));
         let window = Window { requests: received_requests, snapshots: published };
@@ -379,6 +386,39 @@ mod tests {
                     .expect("it is published in time")
                     .expect("the daemon runs");
                 assert_eq!(handle.snapshots.borrow_and_update().links.len(), 2);
+            });
+        });
+    }
+
+    /// What is asked is answered; what nobody waits for any more is not done: who has given up was told that it was not.
+    #[test]
+    fn what_is_asked_is_answered_and_only_then_done() {
+        let ((_autopilot, autopilot_address), (_ground, ground_address)) = (socket(), socket());
+        with_daemon(autopilot_address, ground_address, |mut handle| {
+            let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().expect("a runtime");
+            runtime.block_on(async {
+                let ask = |gimbal: &str| {
+                    let (answer, answered) = tokio::sync::oneshot::channel();
+                    (CoreRequest::Ask { gimbal: gimbal.to_owned(), asked: Asked::TakeControl, answer }, answered)
+                };
+                let (unknown, answered) = ask("lamp");
+                handle.requests.send(unknown).await.expect("the daemon runs");
+                let answer = tokio::time::timeout(PATIENCE, answered).await.expect("in time");
+                assert_eq!(answer, Ok(Err(NotDone::UnknownGimbal)));
+
+                let (given_up, answered) = ask("camera");
+                drop(answered);
+                handle.requests.send(given_up).await.expect("the daemon runs");
+                handle.requests.send(CoreRequest::Refresh).await.expect("the daemon runs");
+                handle.snapshots.changed().await.expect("the daemon runs");
+                assert_eq!(handle.snapshots.borrow_and_update().gimbals[0].primary, None);
+
+                let (taken, answered) = ask("camera");
+                handle.requests.send(taken).await.expect("the daemon runs");
+                assert_eq!(tokio::time::timeout(PATIENCE, answered).await.expect("in time"), Ok(Ok(())));
+                handle.requests.send(CoreRequest::Refresh).await.expect("the daemon runs");
+                handle.snapshots.changed().await.expect("the daemon runs");
+                assert_eq!(handle.snapshots.borrow_and_update().gimbals[0].primary.as_deref(), Some("http"));
             });
         });
     }

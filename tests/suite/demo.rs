@@ -5,6 +5,7 @@ mod process;
 
 use std::fs;
 use std::net::{SocketAddr, UdpSocket};
+use std::path::Path;
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, SystemTime};
 
@@ -78,6 +79,11 @@ fn a_client_of_the_demo_steers_the_gimbal() {
     assert_eq!((outcome.code, outcome.errors.as_str()), (Some(0), ""));
     assert!(outcome.output.contains(&format!("http://{http}")), "{}", outcome.output);
     assert!(outcome.output.contains("--master=udpout:127.0.0.1:14551,"), "{}", outcome.output);
+    let control = "gimbald gimbal gimbal-154 point --pitch-deg -30 --token-file ";
+    let (_, rest) = outcome.output.split_once(control).unwrap_or_else(|| panic!("{}", outcome.output));
+    let (token_file, rest) = rest.split_once(' ').expect("the page is not where it usually is");
+    assert!(rest.starts_with(&format!("--url http://{http}\n")), "{rest}");
+    assert!(!Path::new(token_file).exists(), "{token_file} ends with the demo");
     let heard = ground.stop();
     for source in [AUTOPILOT, MANAGER] {
         let beats =

@@ -342,3 +342,17 @@ fn control_can_be_given_to_http_and_taken_back() {
     assert_eq!(only_setpoint(&mut world, places).angular_velocity_z, 0.0, "the rotation ends with the control");
     assert_eq!(ask(&mut world, &turn_right()), denied("not_in_control", Some(GCS)));
 }
+
+/// "One component per gimbal": who asks for one gimbal is nobody to the other.
+#[test]
+fn each_gimbal_is_asked_by_its_own_name() {
+    let gimbals = ["left", "right"].map(|name| GimbalSettings::found(name.to_owned())).into();
+    let (mut world, places) = World::empty(Settings { gimbals, ..three_links() });
+    world.run_for(SECOND);
+    world.input(Input::Asked { id: OperationId(1), gimbal: "right", asked: &Asked::TakeControl });
+    world.input(Input::Asked { id: OperationId(2), gimbal: "Right", asked: &Asked::TakeControl });
+    assert_eq!(world.answers, [(OperationId(1), Ok(())), (OperationId(2), Err(NotDone::UnknownGimbal))]);
+    let held: Vec<Option<String>> = world.snapshot().gimbals.into_iter().map(|gimbal| gimbal.primary).collect();
+    assert_eq!(held, [None, Some("http".to_owned())]);
+    assert!(setpoints(&mut world, places).is_empty());
+}
