@@ -55,6 +55,10 @@ impl UnderWay {
         }
     }
 
+    pub fn is_under_way(&self, component: u8, id: OperationId) -> bool {
+        self.entries.iter().any(|entry| (entry.component, entry.id) == (component, id))
+    }
+
     /// The ids of commands are their manager's own.
     fn take(&mut self, component: u8, id: OperationId) -> Option<Entry> {
         let at = self.entries.iter().position(|entry| (entry.component, entry.id) == (component, id))?;

@@ -100,6 +100,8 @@ impl Bridge {
             }
             ManagerOutput::Steer(setpoint) => self.roster.get_mut(at).driver.handle_setpoint(now, setpoint),
             ManagerOutput::Commanded { id, commander } => self.handle_commanded(now, component, id, commander),
+            // One that was refused because too much is being done is not done.
+            ManagerOutput::Operate { id, .. } if !self.asked.is_under_way(component, id) => {}
             ManagerOutput::Operate { id, operation } => {
                 self.roster.get_mut(at).driver.handle_operation(now, id, operation)
             }
