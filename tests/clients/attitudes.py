@@ -52,6 +52,23 @@ def slope(seen, axis):
     return sum((one.clock - mean_time) * (angle - mean_turned) for one, angle in zip(seen, turned)) / spread
 
 
+class Heading:
+    """Where the vehicle heads, of its ATTITUDE; one thread tells, another asks."""
+
+    def __init__(self):
+        self._last = None
+
+    def add(self, message):
+        self._last = (time.monotonic(), math.degrees(message.yaw), math.degrees(message.yawspeed))
+
+    def now(self):
+        """Degrees, going on as it last turned; None before the first."""
+        if self._last is None:
+            return None
+        at, heading, rate = self._last
+        return wrapped(heading + rate * (time.monotonic() - at))
+
+
 class Attitudes:
     """Filled by the client's own thread or loop; judged by the script."""
 
@@ -73,6 +90,12 @@ class Attitudes:
             self.add(pitch, wrapped(yaw - heading), yaw, roll, clock)
         else:
             self.add(pitch, yaw, wrapped(yaw + heading), roll, clock)
+
+    def add_orientation(self, message, heading):
+        """A MOUNT_ORIENTATION. Where North is a gimbal may not know, so the vehicle's heading tells it, once it is known."""
+        clock = message.time_boot_ms / 1000
+        yaw_north = None if heading is None else wrapped(message.yaw + heading)
+        self.add(message.pitch, message.yaw, yaw_north, message.roll, clock)
 
     def since(self, moment):
         with self._lock:

@@ -290,7 +290,7 @@ def body(steps, rig, wire, proxy):
     steps.run("centers, goes to neutral and retracts", goes_home)
     steps.run("points at a click on the map", points)
     steps.run("ends pointing", ends_roi)
-    with GroundStation(rig.ground_port, 254) as other:
+    with GroundStation(rig.ground_port, 254, device=rig.kind.device) as other:
         steps.run("says that it is refused while another has control", lambda: refused(other))
         steps.run("steers again after the other's release", lambda: steers_again(other))
     steps.run("loads its older gimbal module", loads_gimbal_module)

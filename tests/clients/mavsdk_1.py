@@ -7,6 +7,7 @@ from importlib.metadata import version
 
 from mavsdk.gimbal import ControlMode, GimbalError, GimbalMode, GimbalResult
 
+import gimbals
 from attitudes import Attitudes
 from mavsdk_server import Library, Server
 from mavsdk_steps import Client, Vocabulary
@@ -17,7 +18,8 @@ from steps import Failure, Steps, expect
 class Remote(Client):
     has_commands = False
 
-    def __init__(self, server):
+    def __init__(self, server, kind):
+        self._kind = kind
         self.library = Library(server.grpc_port)
         self.plugin = self.library.drone.gimbal
         self.attitudes = Attitudes()
@@ -26,8 +28,8 @@ class Remote(Client):
         self.library.follow(self.plugin.control(), self._handle_control)
 
     def _handle_attitude(self, angles):
-        # It hands on the yaw as it came; the simulated gimbal gives it from North.
-        self.attitudes.add(angles.pitch_deg, yaw_north=angles.yaw_deg, roll=angles.roll_deg)
+        # It hands on the yaw as it came, and not from where.
+        self.attitudes.add(angles.pitch_deg, roll=angles.roll_deg, **{self._kind.status_yaw: angles.yaw_deg})
 
     def _handle_control(self, control):
         self._control = control
@@ -70,13 +72,14 @@ class Remote(Client):
 
 
 def main():
-    steps = Steps(f"MAVSDK {version('mavsdk')}")
+    gimbal = gimbals.chosen()
+    steps = Steps(f"MAVSDK {version('mavsdk')}{gimbal.suffix}")
 
     def run():
-        with Rig("mavsdk-1") as rig:
+        with Rig("mavsdk-1", gimbal=gimbal) as rig:
             with Server(f"udp://:{rig.listener_port}", "mavsdk-1-server.log") as server:
                 clients = []
-                steps.run("connects", lambda: clients.append(Remote(server)), essential=True)
+                steps.run("connects", lambda: clients.append(Remote(server, gimbal)), essential=True)
                 Vocabulary(steps, rig, clients[0], rig.listener).run()
                 clients[0].library.close()
 

@@ -13,6 +13,7 @@ warnings.filterwarnings("ignore", category=FutureWarning)
 
 from mavsdk.gimbal import ControlMode, GimbalError, GimbalMode, GimbalResult, SendMode  # noqa: E402
 
+import gimbals  # noqa: E402
 from attitudes import Attitudes  # noqa: E402
 from mavsdk_server import Library, Server  # noqa: E402
 from mavsdk_steps import Client, Vocabulary, demands  # noqa: E402
@@ -97,7 +98,7 @@ def body(steps, rig, server, wire):
     def lists():
         at, gimbals = wait_for("a gimbal in the list", lambda: client.listed, 10)
         shown = [(g.gimbal_manager_component_id, g.gimbal_device_id) for g in gimbals]
-        expect(shown == [(191, 154)], f"listed {shown}")
+        expect(shown == [rig.kind.ids], f"listed {shown}")
         took = at - client.connected_at
         expect(took < 2.0, f"listed {took:.2f} s after connecting")
         wait_for("the id in the stream of attitudes", lambda: client.gimbal_id, 5)
@@ -125,10 +126,11 @@ def body(steps, rig, server, wire):
 
 
 def main():
-    steps = Steps(f"MAVSDK {version('mavsdk')}")
+    gimbal = gimbals.chosen()
+    steps = Steps(f"MAVSDK {version('mavsdk')}{gimbal.suffix}")
 
     def run():
-        with Rig("mavsdk-3") as rig:
+        with Rig("mavsdk-3", gimbal=gimbal) as rig:
             wire = rig.ground_wire()
             with Server(f"udpout://127.0.0.1:{wire.port}", "mavsdk-3-server.log") as server:
                 body(steps, rig, server, wire)

@@ -104,7 +104,7 @@ class Vocabulary:
         if self.client.has_commands:
             run("addresses every gimbal with id 0", self.addresses_everybody)
         run("releases control", self.releases)
-        with GroundStation(self.rig.ground_port, 254) as other:
+        with GroundStation(self.rig.ground_port, 254, device=self.rig.kind.device) as other:
             run("sees that another has control", lambda: self.another_takes(other), essential=True)
             run("is refused while another has control", lambda: self.is_refused(other))
             run("takes control over, and the other is refused", lambda: self.takes_over(other))
@@ -178,10 +178,10 @@ class Vocabulary:
     def locks(self, directions=(0, 90, 180, -90)):
         for yaw in directions:
             self.client.angles(-5, yaw, lock=True)
-            self.camera.wait_at(pitch=-5, yaw_north=yaw)
+            self.camera.wait_at(pitch=-5, yaw_north=yaw, within=self.rig.kind.within_north)
         rate = self.camera.rate("yaw_vehicle")
         expect(abs(rate + TURN_RATE_DPS) < 1, f"turns at {rate:.2f} °/s against the vehicle")
-        self.camera.wait_at(pitch=-5, yaw_north=directions[-1])
+        self.camera.wait_at(pitch=-5, yaw_north=directions[-1], within=self.rig.kind.within_north)
 
     def turns(self, once):
         self.client.angles(20, 0, once=once)
@@ -205,7 +205,7 @@ class Vocabulary:
     def turns_locked(self):
         """Client checklist E108: "Rate while locked (bit 16) is about north"."""
         self.client.angles(0, 0, lock=True)
-        self.camera.wait_at(pitch=0, yaw_north=0)
+        self.camera.wait_at(pitch=0, yaw_north=0, within=self.rig.kind.within_north)
         self.client.rates(0, 10, lock=True)
         rate = self.camera.rate("yaw_north", 1.5)
         self.client.rates(0, 0, lock=True)

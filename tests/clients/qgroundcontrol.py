@@ -6,6 +6,7 @@ Without `snoop_autopilot`, and with it: then what it says to the autopilot is ob
 import concurrent.futures
 import time
 
+import gimbals
 from attitudes import slope
 from dialect import mavlink
 from frames import commands
@@ -28,7 +29,6 @@ from steps import Steps, angle_between, expect, wait_for
 ACCEPTED, DENIED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED
 UNSUPPORTED = mavlink.MAV_RESULT_UNSUPPORTED
 MANAGER, AUTOPILOT = (1, 191), (1, 1)
-GIMBAL = (191, 154)
 CAN_RETRACT, CAN_LOCK = 1, 1024
 OWN = "{}/{}".format(*QGroundControl.ids)
 
@@ -58,7 +58,7 @@ class Operator:
         took = client.found_at - client.gate_at
         # It asks at a heartbeat, of which there is one a second.
         expect(took < 2.5, f"{took:.2f} s after it began to look for gimbals")
-        expect(client.listed == [GIMBAL], f"it lists {client.listed}")
+        expect(client.listed == [self.rig.kind.ids], f"it lists {client.listed}")
         can = client.active.information.cap_flags
         expect(can & CAN_RETRACT and can & CAN_LOCK, f"a button is missing: {can:#x}")
         asked = [
@@ -66,7 +66,9 @@ class Operator:
             for frame in commands(self.wire.peer_said())
             if frame.target == MANAGER and (frame.message.command, frame.message.param1) == (REQUEST_MESSAGE, INFORMATION)
         ]
-        expect(len(asked) == 1, f"it had to ask {len(asked)} times")
+        # As a component that beats; and once more as the manager of a gimbal, if it has heard of that at the same time.
+        most = 1 if self.rig.kind.is_component else 2
+        expect(1 <= len(asked) <= most, f"it had to ask {len(asked)} times")
         return f"{took:.2f} s after it began to look for gimbals"
 
     def acquires_and_releases(self):
@@ -131,7 +133,7 @@ class Operator:
         rate = self.camera.rate("yaw_vehicle")
         expect(abs(rate + TURN_RATE_DPS) < 1, f"turns at {rate:.2f} °/s against the vehicle")
         pitch, yaw = client.click(0.5, -0.25)
-        self.camera.wait_at(pitch=pitch, yaw_north=yaw)
+        self.camera.wait_at(pitch=pitch, yaw_north=yaw, within=self.rig.kind.within_north)
         client.set_yaw_lock(False)
         wait_for("the label 'Yaw follow'", lambda: active.label == "Yaw follow", 0.5)
         rate = self.camera.rate("yaw_north")
@@ -141,7 +143,10 @@ class Operator:
     def retracts(self):
         client, active = self.client, self.client.active
         client.retract()
-        wait_for("the label 'Retracted'", lambda: active.label == "Retracted", 1)
+        if self.rig.kind.tells_retract:
+            wait_for("the label 'Retracted'", lambda: active.label == "Retracted", 1)
+        else:
+            self.camera.wait_at(pitch=0, yaw_vehicle=0)
         client.center()
         self.camera.wait_at(pitch=0, yaw_vehicle=0)
         wait_for("the label 'Yaw follow'", lambda: active.label == "Yaw follow", 1)
@@ -272,7 +277,7 @@ class Operator:
         client = self.client
         client.check()
         expect(not client.thrown_away, f"it threw away {client.thrown_away}")
-        unanswered = [key for key in client.unanswered if key[0] == GIMBAL[0]]
+        unanswered = [key for key in client.unanswered if key[0] == MANAGER[1]]
         expect(not unanswered, f"without an answer: {unanswered}")
 
     def ends(self):
@@ -280,7 +285,7 @@ class Operator:
         self.expect_no_error()
         slowest = max(self.client.answer_times)
         expect(slowest < 0.5, f"an answer took {slowest:.2f} s")
-        expect(self.client.listed == [GIMBAL], f"it lists {self.client.listed}")
+        expect(self.client.listed == [self.rig.kind.ids], f"it lists {self.client.listed}")
         return f"slowest of {len(self.client.answer_times)} answers: {slowest * 1000:.0f} ms"
 
     # --- what goes to the autopilot ----------------------------------------------------------------------------
@@ -341,7 +346,7 @@ def modern(steps, rig, generation):
         if generation.has_gimbal_rate:
             step("a rate of another part of the program ends", operator.gimbal_rate_ends)
         step("drags", operator.drags)
-        with GroundStation(rig.ground_port, 254) as other:
+        with GroundStation(rig.ground_port, 254, device=rig.kind.device) as other:
             step("asks the operator while another has control", lambda: operator.another_has_control(other))
             step("takes control over", lambda: operator.takes_over(other))
         step("lost no click", operator.ends)
@@ -472,7 +477,7 @@ def qt5(steps, rig, is_obeyed):
 def exclusive(steps, rig):
     """Where nobody takes control from a holder."""
     wire = rig.ground_wire()
-    with QGroundControl(wire.port, NEWEST) as client, GroundStation(rig.ground_port, 254) as other:
+    with QGroundControl(wire.port, NEWEST) as client, GroundStation(rig.ground_port, 254, device=rig.kind.device) as other:
         operator = Operator(steps, rig, client, wire)
 
         def is_refused():
@@ -517,10 +522,22 @@ def with_snooping(steps):
         exclusive(steps, rig)
 
 
+def with_another_gimbal(steps, gimbal):
+    """What its operator does does not depend on the gimbal, but for what that can do."""
+    with Rig("qgroundcontrol", settings=SNOOP, gimbal=gimbal) as rig:
+        modern(steps, rig, NEWEST)
+        points(steps, rig, NEWEST, is_obeyed=True)
+        qt5(steps, rig, is_obeyed=True)
+
+
 def main():
-    steps = Steps("QGroundControl")
+    gimbal = gimbals.chosen()
+    steps = Steps(f"QGroundControl{gimbal.suffix}")
 
     def run():
+        if gimbal is not gimbals.MAVLINK_V2:
+            with_another_gimbal(steps, gimbal)
+            return
         with concurrent.futures.ThreadPoolExecutor() as pool:
             for flight in [pool.submit(flight, steps) for flight in (without_snooping, with_snooping)]:
                 flight.result()

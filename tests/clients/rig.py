@@ -22,9 +22,10 @@ import tty
 import urllib.error
 import urllib.request
 
-from attitudes import Attitudes
+from attitudes import Attitudes, Heading
 from dialect import mavlink
 from frames import decode
+from gimbals import MAVLINK_V2
 from steps import Failure, wait_for
 
 # The simulated vehicle flies a circle of 40 m around home, 50 m above it, to the right.
@@ -182,8 +183,8 @@ class Cable(Tap):
 class Wire(Tap):
     """A UDP path between the daemon and one peer. One of them listens on a port; the other sends to `port`."""
 
-    def __init__(self, daemon_port=None, peer_port=None):
-        super().__init__()
+    def __init__(self, daemon_port=None, peer_port=None, hear_peer=None):
+        super().__init__(hear_peer)
         # Who has no port yet has it when it is first heard.
         self._addresses = {}
         self._daemon = self._open(daemon_port)
@@ -218,8 +219,9 @@ class Wire(Tap):
 class Rig:
     """`with Rig("name") as rig:` gives a daemon that has found its vehicle and gimbal."""
 
-    def __init__(self, name, system_id=1, autopilot="px4", settings=""):
-        self._name = name
+    def __init__(self, name, system_id=1, autopilot="px4", settings="", gimbal=MAVLINK_V2):
+        self._name = name if gimbal is MAVLINK_V2 else f"{name}-{gimbal.name}"
+        self.kind = gimbal
         self._system_id = system_id
         self._autopilot = autopilot
         self._settings = settings
@@ -229,6 +231,10 @@ class Rig:
         self.camera = Attitudes()
         self._camera_decoder = mavlink.MAVLink(None)
         self._camera_decoder.robust_parsing = True
+        # Where the vehicle heads, by its own word.
+        self._heading = Heading()
+        self._vehicle_decoder = mavlink.MAVLink(None)
+        self._vehicle_decoder.robust_parsing = True
         self.ground_port = free_port()
         # Where the daemon's messages go unasked, by way of `listener`.
         self.listener_port = free_port()
@@ -240,7 +246,7 @@ class Rig:
         self._folder = tempfile.TemporaryDirectory(prefix="gimbald-")
         autopilot_port = free_port()
         self.cable = Cable(self._see)
-        self.wire = self._lay(Wire(autopilot_port))
+        self.wire = self._lay(Wire(autopilot_port, hear_peer=self._see_vehicle))
         self.listener = self._lay(Wire(peer_port=self.listener_port))
         config = pathlib.Path(self._folder.name) / "gimbald.toml"
         config.write_text(
@@ -269,11 +275,12 @@ endpoint = "udpout:127.0.0.1:{self.listener.port}"
 listen = "{self._listen}"
 
 {self._settings}
+{self.kind.settings()}
 """
         )
         system_id = str(self._system_id)
         vehicle = ["--endpoint", f"udpout:127.0.0.1:{self.wire.port}", "--autopilot", self._autopilot]
-        gimbal = ["--endpoint", f"serial:{self.cable.peer_path}:115200", "--frames", "strict"]
+        gimbal = ["--endpoint", f"serial:{self.cable.peer_path}:115200", *self.kind.options]
         try:
             self.daemon = self._start("daemon", "--log", "debug", "run", "--config", str(config))
             self._start("vehicle", "sim", "vehicle", "--system-id", system_id, *vehicle)
@@ -304,6 +311,13 @@ listen = "{self._listen}"
         for message in self._camera_decoder.parse_buffer(data) or []:
             if message.get_type() == "GIMBAL_DEVICE_ATTITUDE_STATUS":
                 self.camera.add_status(message)
+            elif message.get_type() == "MOUNT_ORIENTATION":
+                self.camera.add_orientation(message, self._heading.now())
+
+    def _see_vehicle(self, data):
+        for message in self._vehicle_decoder.parse_buffer(data) or []:
+            if message.get_type() == "ATTITUDE":
+                self._heading.add(message)
 
     def _start(self, part, *arguments):
         process = Process(f"gimbald ({part})", [GIMBALD, *arguments], LOGS / f"{self._name}-{part}.log")
@@ -319,6 +333,8 @@ listen = "{self._listen}"
             return False  # the page is not up yet
         gimbals, vehicle = status["gimbals"], status["vehicle"]
         if not gimbals or gimbals[0]["state"] != "alive" or not gimbals[0]["model"]:
+            return False
+        if gimbals[0]["attitude"]["pitch_deg"] is None:
             return False
         return vehicle["heading_deg"] is not None and vehicle["position_age_ms"] is not None
 

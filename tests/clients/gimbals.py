@@ -1,0 +1,65 @@
+"""The simulated gimbals that a rig may have, and by what a client may tell them apart: their capabilities and their ids."""
+
+import sys
+from typing import NamedTuple
+
+
+class Gimbal(NamedTuple):
+    name: str
+    # Of `gimbald sim gimbal`.
+    options: tuple
+    # Of its `[[gimbal]]` entry; without it, it is found by itself.
+    family: str = None
+    # The manager's component and the gimbal's id, as clients list them.
+    ids: tuple = (191, 154)
+    vendor: str = "gimbald"
+    model: str = "Simulated v2"
+    # How near it comes to a yaw from North while the vehicle turns, degrees: one that is turned for it lags behind.
+    within_north: float = 1.0
+    # From where GIMBAL_DEVICE_ATTITUDE_STATUS counts the yaw of this gimbal.
+    status_yaw: str = "yaw_north"
+    # Whether it tells that it is retracted, or only goes to where it is stowed.
+    tells_retract: bool = True
+
+    @property
+    def suffix(self):
+        """What the steps with it are called besides."""
+        return "" if self is MAVLINK_V2 else f" with {self.name}"
+
+    @property
+    def device(self):
+        return self.ids[1]
+
+    @property
+    def is_component(self):
+        """Whether it is a v2 device, which speaks for itself; its manager speaks for any other."""
+        return self.device > 6
+
+    def settings(self):
+        """Its entry in the configuration."""
+        return f'[[gimbal]]\nname = "camera"\nlink = "gimbal"\nfamily = "{self.family}"\n' if self.family else ""
+
+
+def gremsy(generation):
+    # Faster than it comes, as the steps were written for a gimbal that turns at 100 degrees per second.
+    options = ("--family", "gremsy", "--gremsy-generation", generation, "--slew", "100")
+    # Only the one that is no v2 device needs an id of its own.
+    device = {"v1": 1, "v2": 154}[generation]
+    return Gimbal(f"gremsy_{generation}", options, "gremsy", (191, device), "GREMSY", "MIO", tells_retract=False)
+
+
+MAVLINK_V2 = Gimbal("mavlink_v2", ("--frames", "strict"))
+# With ends so far apart that it need not go all the way round while it is locked and the vehicle turns, and none of them
+# ahead.
+V1_OPTIONS = ("--family", "mavlink_v1", "--yaw-range", "350")
+MAVLINK_V1 = Gimbal("mavlink_v1", V1_OPTIONS, "mavlink_v1", (191, 1), "", "MAVLink v1", 2.5, "yaw_vehicle")
+
+ALL = {gimbal.name: gimbal for gimbal in (MAVLINK_V2, MAVLINK_V1, gremsy("v1"), gremsy("v2"))}
+
+
+def chosen():
+    """The one that the command line names, by default a v2 device."""
+    name = sys.argv[1] if len(sys.argv) > 1 else MAVLINK_V2.name
+    if name not in ALL:
+        sys.exit(f"{name} is no gimbal; expected one of {', '.join(ALL)}")
+    return ALL[name]
