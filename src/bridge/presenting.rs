@@ -308,10 +308,15 @@ impl Bridge {
         if autopilots.is_empty() || source.component == component::AUTOPILOT1 {
             return channels;
         }
+        let Some(system) = self.identity.system() else {
+            // Nothing is presented yet; but what is seen there in the meantime would be taken for it.
+            let is_namesake = self.presented.devices.iter().any(|device| device.component == source.component);
+            let hidden = if is_namesake { autopilots } else { ChannelSet::EMPTY };
+            return self.drop_towards(channels, hidden, "presented_instead");
+        };
         let is_hidden = |device: &PresentedDevice| {
             let real = self.roster.iter().find(|gimbal| gimbal.component == device.manager);
-            Some(source) == real.and_then(|gimbal| gimbal.adopted)
-                || device.component == source.component && Some(source.system) == self.identity.system()
+            Some(source) == real.and_then(|gimbal| gimbal.adopted) || source == MavId::new(system, device.component)
         };
         let hidden = (0..self.presented.devices.len())
             .filter(|at| is_hidden(&self.presented.devices[*at]))

@@ -1,7 +1,7 @@
 //! Who sees whom: the autopilot the presented device and not the gimbal, everybody else the gimbal and one manager.
 
 use gimbald::bridge::Input;
-use gimbald::bridge::settings::{Role, Settings, Transport};
+use gimbald::bridge::settings::{Role, Settings, SystemId, Transport};
 use gimbald::wire::MavId;
 use gimbald::wire::dialect::{
     AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA,
@@ -34,6 +34,24 @@ fn the_real_gimbal_is_not_seen_by_the_autopilot() {
     let dropped = &world.snapshot().links[0].dropped;
     // Three of them were there before, when the gimbal introduced itself.
     assert_eq!(dropped.get("presented_instead"), Some(&7), "{dropped:?}");
+}
+
+/// Also while our system id is not settled, so that the device is not presented yet: ArduPilot would take what it sees in the
+/// meantime for the device, and drive both.
+#[test]
+fn the_real_gimbal_is_not_seen_before_the_device_is() {
+    let (mut world, places) = World::empty(Settings { system_id: SystemId::Auto, ..presenting() });
+    let beats = [
+        (SECOND, places.autopilot, AUTOPILOT, ardupilot_heartbeat()),
+        (SECOND / 10, places.gimbal, GIMBAL, gimbal_heartbeat()),
+    ];
+    world.run_with(SECOND * 5 / 2, &beats);
+    assert_eq!(world.snapshot().system_id, None);
+    assert_eq!(of_device(world.take(places.autopilot)), []);
+    assert_eq!(of_device(world.take(places.ground)).len(), 25);
+    world.run_with(2 * SECOND, &beats);
+    assert_eq!(world.snapshot().system_id, Some(1));
+    assert_eq!(ids(&of_device(world.take(places.autopilot))), [0, 0], "once a second");
 }
 
 /// "The autopilot's own 280/281/285 (and 283 it relays) do not reach the ground: counted and shown", and there is nothing
