@@ -17,7 +17,8 @@ use proptest::prelude::*;
 use crate::support::control_rule::Rule;
 use crate::support::script::{
     NAN, command_int, command_long, device_information, device_status, gimbal_heartbeat, global_position,
-    ground_heartbeat, in_frame, of, px4_heartbeat, set_attitude, set_manual_control, set_pitchyaw, usual_capabilities,
+    ground_heartbeat, in_frame, mount_configure, mount_control, of, px4_heartbeat, set_attitude, set_manual_control,
+    set_pitchyaw, usual_capabilities,
 };
 use crate::support::wire::checksum;
 use crate::support::world::{AUTOPILOT, Arrival, GCS, GIMBAL, MANAGER, Places, World, three_links};
@@ -66,8 +67,9 @@ proptest! {
         steps in proptest::collection::vec(step(), 1..60),
         open_when_unclaimed in any::<bool>(),
         takeover in takeover(),
+        accept_centidegrees in any::<bool>(),
     ) {
-        let control = ControlSettings { open_when_unclaimed, ..ControlSettings::default() };
+        let control = ControlSettings { open_when_unclaimed, accept_centidegrees, ..ControlSettings::default() };
         let mut settings = Settings { control, ..three_links() };
         settings.gimbals.push(gimbald::gimbals::settings::GimbalSettings {
             takeover,
@@ -112,7 +114,8 @@ proptest! {
         // angles, from the next setpoint on.
         look_on(&mut world, places, flags, Duration::from_millis(100));
         check_what_was_said(&mut world, places)?;
-        let was_turning = is_turning(&world);
+        // What the secondary adds goes on after the primary's rate has ended, and the rest of it in angles.
+        let was_turning = is_turning(&world) && !is_nudged(&world);
         let mut stopped = false;
         for _ in 0..120 {
             look_on(&mut world, places, flags, Duration::from_millis(100));
@@ -302,6 +305,11 @@ fn is_turning(world: &World) -> bool {
     setpoint.as_ref().is_some_and(|setpoint| setpoint.mode == "rate")
 }
 
+fn is_nudged(world: &World) -> bool {
+    let setpoint = &world.snapshot().gimbals[0].setpoint;
+    setpoint.as_ref().is_some_and(|setpoint| (setpoint.nudge_pitch_deg, setpoint.nudge_yaw_deg) != (0.0, 0.0))
+}
+
 fn introduce(world: &mut World, places: Places) {
     world.send(places.autopilot, AUTOPILOT, &px4_heartbeat());
     world.send(places.ground, GCS, &ground_heartbeat());
@@ -367,7 +375,7 @@ fn step() -> BoxedStrategy<Step> {
     let sender = 0..SENDERS.len();
     prop_oneof![
         12 => (sender.clone(), message()).prop_map(|(sender, message)| Step::Say { sender, message: Box::new(message) }),
-        3 => (sender, prop_oneof![Just(75_u32), Just(76), Just(282), Just(284), Just(287), Just(288)], any::<[u8; 40]>(), 1_usize..40)
+        3 => (sender, prop_oneof![Just(75_u32), Just(76), Just(156), Just(157), Just(282), Just(284), Just(287), Just(288)], any::<[u8; 40]>(), 1_usize..40)
             .prop_map(|(sender, id, mut payload, len)| {
                 // No CONFIGURE by chance: the rule beside it would not hear it.
                 payload[29] |= 0x80;
@@ -408,6 +416,10 @@ fn message() -> BoxedStrategy<MavMessage> {
                 let params = if command == 204 { [first, a, b, c, d, d, last] } else { [a, b, c, 100.0, 47.4, 8.5, last] };
                 command_long(target, command, &params)
             }),
+        1 => (target(), numbers()).prop_map(|(target, q)| command_long(target, 220, &q)),
+        1 => (target(), 0_u8..9).prop_map(|(target, mode)| mount_configure(target, mode)),
+        2 => (target(), prop_oneof![3 => Just(20_000), 1 => Just(i32::MAX)].prop_flat_map(|most| [-most..most, -most..most, -most..most]))
+            .prop_map(|(target, inputs)| mount_control(target, inputs)),
         3 => (angle(), angle(), number(), number(), flags())
             .prop_map(|(pitch, yaw, pitch_rate, yaw_rate, flags)| set_pitchyaw(pitch, yaw, pitch_rate, yaw_rate, flags)),
         2 => (numbers(), number(), number(), number(), flags())
