@@ -41,3 +41,29 @@ fn described(field: &Field) -> String {
 fn listed(words: &[&str]) -> String {
     words.iter().map(|word| format!("`{word}`")).collect::<Vec<_>>().join(", ")
 }
+
+/// `docs/families/gremsy.md` tells how each function of the vendor's SDK is done in three ways; two of them are in the table.
+#[test]
+fn what_the_page_of_gremsy_names_is_there() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/families/gremsy.md");
+    let page = fs::read_to_string(page).expect("it is there");
+    let (mut paths, mut commands) = (0, 0);
+    for row in page.lines().filter(|line| line.starts_with("| `")) {
+        let cells: Vec<&str> = row.split(" | ").collect();
+        let [_, _, http, command, ..] = cells[..] else { continue };
+        for path in http.strip_prefix("`POST` ").into_iter().flat_map(quoted) {
+            assert!(ACTIONS.iter().any(|action| action.path == path), "no path {path}: {row}");
+            paths += 1;
+            for command in quoted(command) {
+                assert!(Action::of_command(command).is_some(), "no command {command}: {row}");
+                commands += 1;
+            }
+        }
+    }
+    assert!(paths > 20 && commands > 20, "the table was found: {paths} paths, {commands} commands");
+}
+
+/// What stands between backticks.
+fn quoted(cell: &str) -> impl Iterator<Item = &str> {
+    cell.split('`').skip(1).step_by(2)
+}
