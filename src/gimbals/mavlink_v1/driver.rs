@@ -5,6 +5,7 @@
 //! that, or will not.
 
 use std::collections::VecDeque;
+use std::ops::Range;
 use std::time::Duration;
 
 use super::config::{V1RadioControl, V1Settings};
@@ -19,7 +20,7 @@ use crate::gimbals::setpoint::{Pointing, RadioControl, Setpoint};
 use crate::gimbals::settings::Family;
 use crate::timers::TimerTable;
 use crate::timestamp::Timestamp;
-use crate::wire::dialect::{COMMAND_LONG_DATA, HEARTBEAT_DATA, MOUNT_STATUS_DATA, MessageData};
+use crate::wire::dialect::{COMMAND_LONG_DATA, HEARTBEAT_DATA, MOUNT_ORIENTATION_DATA, MOUNT_STATUS_DATA, MessageData};
 use crate::wire::ids::{CapFlags, CommandResult, FailureFlags, GimbalFlags, mav_state, message};
 use crate::wire::{Frame, MavId};
 
@@ -30,6 +31,10 @@ pub const LOST_AFTER: Duration = Duration::from_secs(5);
 const REPEAT_EVERY: Duration = Duration::from_millis(500);
 /// And no setpoint is sent sooner after another.
 const LEAST_INTERVAL: Duration = Duration::from_millis(20);
+
+/// A time since boot that jumps back so far, in milliseconds, means that the gimbal was restarted; the end of the range is
+/// where the clock wraps.
+const REBOOT_STEPS_MS: Range<u32> = 1_000..1 << 31;
 
 /// Without a report for so long, the attitude is that of a gimbal which does what it is told.
 const FEEDBACK_MISSING_AFTER: Duration = Duration::from_secs(2);
@@ -74,6 +79,8 @@ pub struct MavlinkV1Driver {
     sent: Option<(Timestamp, MountControl)>,
     configuration: Configuration,
     feedback: Feedback,
+    /// Its clock, where it tells it.
+    boot_ms: Option<u32>,
     /// Where it is taken to look while it does not say so.
     assumed: GimbalAngles,
     assumed_at: Timestamp,
@@ -125,6 +132,7 @@ impl MavlinkV1Driver {
             sent: None,
             configuration: Configuration::Unknown,
             feedback: Feedback::Awaited,
+            boot_ms: None,
             assumed: GimbalAngles::default(),
             assumed_at: Timestamp::ZERO,
             timers: TimerTable::default(),
@@ -149,14 +157,34 @@ impl MavlinkV1Driver {
         let state = heartbeat.system_status;
         let ready =
             !matches!(state, mav_state::BOOT | mav_state::CALIBRATING | mav_state::STANDBY | mav_state::POWEROFF);
-        if state == mav_state::BOOT {
-            self.configuration = Configuration::Unknown;
+        if state == mav_state::BOOT && self.ready {
+            self.restart();
         }
         if ready && !self.ready {
             self.ready = true;
             self.send_when_due(now);
         }
         self.ready = ready;
+    }
+
+    fn handle_boot_ms(&mut self, boot_ms: u32) {
+        let before = self.boot_ms.replace(boot_ms);
+        if before.is_some_and(|before| REBOOT_STEPS_MS.contains(&before.wrapping_sub(boot_ms))) {
+            self.restart();
+            self.boot_ms = Some(boot_ms);
+        }
+    }
+
+    /// It does not do any more what it was told, and is not told it again before somebody asks. Its next heartbeat says
+    /// whether it is ready.
+    fn restart(&mut self) {
+        self.boot_ms = None;
+        self.ready = false;
+        self.wanted = None;
+        self.sent = None;
+        self.configuration = Configuration::Unknown;
+        self.timers.cancel(Timer::Send);
+        self.report(Report::Restarted);
     }
 
     fn handle_attitude(&mut self, now: Timestamp, from_status: bool, attitude: Attitude<VehicleFrame>) {
@@ -271,6 +299,7 @@ impl MavlinkV1Driver {
     fn lose(&mut self) {
         self.alive = false;
         self.ready = false;
+        self.boot_ms = None;
         // What it is told next is told anew, and not before it is asked for again.
         self.wanted = None;
         self.sent = None;
@@ -302,6 +331,9 @@ impl GimbalDriver for MavlinkV1Driver {
             }
             message::MOUNT_ORIENTATION | message::MOUNT_STATUS => {
                 self.handle_heard(now, device);
+                if let Some(orientation) = frame.decode::<MOUNT_ORIENTATION_DATA>() {
+                    self.handle_boot_ms(orientation.time_boot_ms);
+                }
                 if let Some(attitude) = packet::read_attitude(frame, self.settings.report_sign) {
                     self.handle_attitude(now, frame.message_id() == MOUNT_STATUS_DATA::ID, attitude);
                 }

@@ -352,6 +352,42 @@ fn the_mode_is_forgotten_with_the_gimbal_and_sent_again_when_it_is_back() {
     assert_eq!(line.told(), [-20.0, 0.0, 0.0, 2.0]);
 }
 
+/// A gimbal that was restarted within the time in which it would be lost, by its clock or by its word, is not moved before
+/// somebody asks (D9); a clock that wraps after 49 days is no restart.
+#[test]
+fn a_gimbal_that_was_restarted_is_told_nothing_until_asked() {
+    for reports in [Reports::Orientation, Reports::Status] {
+        let mut line = Line::new(Signs::NORMAL, reports);
+        line.run_for(6 * SECOND);
+        line.point(-30.0, 0.0);
+        line.run_for(SECOND);
+        line.reports.clear();
+        line.sent.clear();
+        line.gimbal.handle_reboot(line.now);
+        line.run_for(5 * SECOND);
+        assert_eq!(line.sent, [], "{reports:?}");
+        let restarts = line.reports.iter().filter(|(_, report)| *report == Report::Restarted).count();
+        assert_eq!(restarts, 1, "{reports:?}");
+        assert!(!line.reports.iter().any(|(_, report)| *report == Report::Lost));
+        line.point(-20.0, 0.0);
+        assert_eq!(line.told(), [-20.0, 0.0, 0.0, 2.0]);
+    }
+
+    let mut driver = MavlinkV1Driver::new(V1Settings::default());
+    driver.adopt(Timestamp::ZERO, GIMBAL);
+    let mut restarts = |time_boot_ms| {
+        let orientation = MOUNT_ORIENTATION_DATA { time_boot_ms, roll: 0.0, pitch: 0.0, yaw: 0.0, yaw_absolute: 0.0 };
+        let bytes = encode_to_vec(GIMBAL, 0, &orientation);
+        driver.handle_received(Timestamp::ZERO, &DatagramFrames::new(&bytes).next_frame().expect("a frame"));
+        std::iter::from_fn(|| driver.poll_output()).any(|output| output == DriverOutput::Report(Report::Restarted))
+    };
+    for (time_boot_ms, restarted) in
+        [(u32::MAX - 50, false), (49, false), (5_000, false), (4_500, false), (5_000, false), (100, true), (0, false)]
+    {
+        assert_eq!(restarts(time_boot_ms), restarted, "{time_boot_ms}");
+    }
+}
+
 /// "RC_EXCLUSIVE: stop sending", or "205 p7=3" to one that knows it; the next angle takes the gimbal back.
 #[test]
 fn radio_control_gets_the_gimbal_by_silence_or_by_its_mode() {
