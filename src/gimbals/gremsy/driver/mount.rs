@@ -26,7 +26,10 @@ const MOVES_AT_LEAST: Duration = Duration::from_secs(1);
 const MOVES_AT_MOST: Duration = Duration::from_secs(10);
 
 /// A rate is stopped when whoever steers has not repeated it for so long.
-const DEAD_MAN: Duration = Duration::from_millis(500);
+pub const DEAD_MAN: Duration = Duration::from_millis(500);
+
+/// And no order is carried on with that was not said for so long: whoever steers has let go of it.
+const LET_GO: Duration = Duration::from_secs(1);
 
 /// A mode that it refused is not asked for again sooner.
 const REFUSED_FOR: Duration = Duration::from_secs(2);
@@ -185,6 +188,11 @@ impl Mount {
         self.sent.is_some_and(|(_, sent)| sent.turns())
     }
 
+    /// Whether an order has switched the motors off.
+    pub fn is_retracted(&self) -> bool {
+        self.retraction != Retraction::No
+    }
+
     pub fn wanted(&self) -> Option<Order> {
         self.wanted
     }
@@ -258,6 +266,10 @@ impl Mount {
             tracing::warn!(%device, "a rotation that nobody repeats is stopped");
             self.stop(now, device);
         }
+        if now.since(self.refreshed) >= LET_GO {
+            self.wanted = None;
+            self.sent = None;
+        }
         let Some(wanted) = self.wanted else { return };
         if wanted.is_stop() {
             self.send_when_due(now, device, condition);
@@ -279,11 +291,11 @@ impl Mount {
     /// When [`advance`](Self::advance) is due. `None` while it waits for the gimbal.
     pub fn poll_timeout(&self, condition: Condition) -> Option<Timestamp> {
         let wanted = self.wanted?;
-        let dead_man = wanted.turns().then(|| self.refreshed + DEAD_MAN);
+        let dead_man = Some(self.refreshed + if wanted.turns() { DEAD_MAN } else { LET_GO });
         let waits = match (wanted, self.mode, self.retraction) {
             _ if wanted.is_stop() => None,
             _ if !condition.is_ready => return dead_man,
-            (Order::Home | Order::Retract | Order::RadioControl, ..) => return None,
+            (Order::Home | Order::Retract | Order::RadioControl, ..) => return dead_man,
             (_, _, Retraction::Returning { since }) => Some(since + MOTORS_START),
             (_, Mode::Refused(_, at), _) => Some(at + REFUSED_FOR),
             (Order::Point { mode: wanted, .. } | Order::Turn { mode: wanted, .. }, Mode::Is(mode), _)

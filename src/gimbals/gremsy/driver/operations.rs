@@ -134,7 +134,7 @@ impl GremsyDriver {
             }
             _ => self.write_settings(now, id, operation),
         }
-        self.drain_parameters(now);
+        self.drain_parameters();
     }
 
     fn operate_v1(&mut self, now: Timestamp, id: OperationId, device: MavId, operation: &Operation) {

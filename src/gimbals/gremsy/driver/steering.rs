@@ -3,12 +3,13 @@
 use super::effect::Pose;
 use super::faults::Fault;
 use super::mode_change::{self, ModeChange};
-use super::mount::{Condition, MountOutput, Order};
-use super::{Generation, GremsyDriver};
+use super::mount::{Condition, DEAD_MAN, MountOutput, Order};
+use super::{Generation, GremsyDriver, Timer};
 use crate::geometry::{Angle, AngularRate, GimbalAngles, Yaw, YawFrame};
 use crate::gimbals::driver::{DriverOutput, GimbalDriver};
 use crate::gimbals::gremsy::modes::{self, ControlMode};
 use crate::gimbals::gremsy::packet;
+use crate::gimbals::gremsy::status::OperationState;
 use crate::gimbals::operation::{OperationError, YawMode};
 use crate::gimbals::setpoint::{Pointing, RadioControl, Setpoint, Stabilised, Turning};
 use crate::timestamp::Timestamp;
@@ -32,14 +33,18 @@ impl GremsyDriver {
         self.effect.handle_target(pose_of(setpoint).filter(|_| self.is_present));
         match self.search.decided() {
             Some(Generation::V1) => {
-                self.mount.order(now, order_of(self.about_north(now, setpoint)));
+                let order = order_of(self.about_north(now, setpoint));
+                self.is_handed_over = order == Order::RadioControl;
+                self.mount.order(now, order);
                 self.mount.advance(now, device, self.condition());
             }
             Some(Generation::V2) => self.steer_v2(now, device, setpoint, is_stop),
             None => {}
         }
-        let is_off = self.heard.status.is_some_and(|(_, status)| !status.motors_on());
-        if self.is_present && is_off && !self.is_retracted && !is_stop && !matches!(setpoint, Setpoint::Retract) {
+        // Those that are off for a retract, or on their way, are no news.
+        let is_off = self.heard.status.is_some_and(|(_, status)| status.operation() == OperationState::OFF);
+        let is_retracted = self.is_retracted || self.mode_change.is_some() || self.mount.is_retracted();
+        if self.is_present && is_off && !is_retracted && !is_stop {
             self.raise(Fault::MotorsOff);
         }
     }
@@ -110,11 +115,27 @@ impl GremsyDriver {
             self.is_retracted = false;
             let shows_it = self.heard.attitude.is_some_and(|(_, status)| status.flags.contains(GimbalFlags::RETRACT));
             if shows_it {
+                self.turning = None;
                 self.mode_change = Some(ModeChange::new(now, ControlMode::Reset, None));
                 return;
             }
         }
+        self.turning = match setpoint {
+            Setpoint::Turn(turning) if !turning.is_zero() => Some(turning),
+            _ => None,
+        };
+        if self.turning.is_some() {
+            self.timers.set(Timer::DeadMan, now + DEAD_MAN);
+        }
         self.v2.handle_setpoint(now, setpoint);
+    }
+
+    /// Whoever steers has not repeated a rotation: it ends.
+    pub(super) fn stop_unrepeated(&mut self, now: Timestamp) {
+        if let Some(turning) = self.turning.take() {
+            tracing::warn!("a rotation that nobody repeats is stopped");
+            self.v2.handle_setpoint(now, Setpoint::Turn(turning.stopped()));
+        }
     }
 
     /// A setpoint as the driver for v2 devices makes it: roll and pitch are always level here, rates are all numbers, and
@@ -146,7 +167,7 @@ impl GremsyDriver {
         self.version().is_some_and(|version| version.tells_yaw_frame())
     }
 
-    pub(super) fn handle_mode_step(&mut self, now: Timestamp, device: MavId, step: Option<mode_change::Step>) {
+    pub(super) fn handle_mode_step(&mut self, device: MavId, step: Option<mode_change::Step>) {
         match step {
             None => {}
             Some(mode_change::Step::Send(mode)) => self.send_mode(device, mode),
@@ -157,8 +178,6 @@ impl GremsyDriver {
                     None if result.is_err() => self.raise(Fault::StaysRetracted),
                     None => {}
                 }
-                self.mount.forget_mode();
-                let _ = now;
             }
         }
     }
@@ -167,7 +186,7 @@ impl GremsyDriver {
     pub(super) fn drop_demand(&mut self, now: Timestamp, device: MavId) {
         self.effect.handle_target(None);
         self.mount.drop_order(now, device);
-        self.drain_mount(now);
+        self.drain_mount();
         if let Some(change) = self.mode_change.take()
             && let Some(id) = change.asker()
         {
@@ -178,15 +197,15 @@ impl GremsyDriver {
     pub(super) fn steer_on(&mut self, now: Timestamp, device: MavId) {
         if let Some(change) = &mut self.mode_change {
             let step = change.handle_timeout(now);
-            self.handle_mode_step(now, device, step);
+            self.handle_mode_step(device, step);
         }
         if self.search.decided() == Some(Generation::V1) {
             self.mount.advance(now, device, self.condition());
         }
-        self.drain_mount(now);
+        self.drain_mount();
     }
 
-    fn drain_mount(&mut self, _now: Timestamp) {
+    fn drain_mount(&mut self) {
         while let Some(output) = self.mount.poll_output() {
             match output {
                 MountOutput::Send(command) => self.send_command(command),

@@ -46,8 +46,7 @@ impl GremsyDriver {
         let motors_off = self.heard.status.is_some_and(|(_, status)| !status.motors_on());
         flags.set(GimbalFlags::RETRACT, motors_off || self.mount.wanted() == Some(Order::Retract));
         flags.set(GimbalFlags::NEUTRAL, self.mount.wanted() == Some(Order::Home));
-        let is_handed_over = self.is_handed_over || self.mount.wanted() == Some(Order::RadioControl);
-        flags.set(GimbalFlags::RC_EXCLUSIVE, is_handed_over);
+        flags.set(GimbalFlags::RC_EXCLUSIVE, self.is_handed_over);
         self.tell_attitude(
             now,
             GimbalStatus {
@@ -70,7 +69,7 @@ impl GremsyDriver {
         }
         if let (Some(change), Some(device)) = (self.mode_change, self.device) {
             let step = change.handle_flags(status.flags);
-            self.handle_mode_step(now, device, step);
+            self.handle_mode_step(device, step);
         }
         let status = GimbalStatus { failures: status.failures | self.failures(), ..status };
         let is_wrong = self.version().is_some_and(|version| version.has_wrong_earth_yaw());
@@ -232,6 +231,7 @@ impl GremsyDriver {
         } else {
             self.faults.clear(|fault| *fault == Fault::NoParameters);
         }
+        self.report_known();
     }
 }
 

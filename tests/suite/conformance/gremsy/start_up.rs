@@ -335,3 +335,21 @@ fn clients_see_one_gimbal_with_one_id() {
         assert_eq!(last.gimbal_device_id, if id == 154 { 0 } else { id });
     }
 }
+
+/// The power fails while it turns: when it is back, hanging as its weight has it, nothing turns it on nor keeps it there.
+#[test]
+fn a_power_failure_while_it_turns_leaves_nothing_behind() {
+    for generation in [Generation::V1, Generation::V2] {
+        let (mut world, places) = running(generation);
+        demand(&mut world, places, [f32::NAN, f32::NAN, 0.0, 10.0, 0.0]);
+        run(&mut world, places, SECOND);
+        world.reboot(places.gimbal);
+        run(&mut world, places, 15 * SECOND);
+        world.forget();
+        run(&mut world, places, 5 * SECOND);
+        assert_eq!(seen(&world).details.stage.as_deref(), Some("running"), "{generation:?}");
+        assert_eq!(seen(&world).setpoint, None, "{generation:?}");
+        assert_eq!(orders(&mut world, places), (vec![], vec![]), "{generation:?}");
+        assert_looks(&world, 0.0, 0.0);
+    }
+}

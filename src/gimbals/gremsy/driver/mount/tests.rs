@@ -149,6 +149,22 @@ fn a_rate_that_nobody_repeats_is_stopped() {
     assert_eq!(sent.last().map(|(_, output)| output), Some(&stop));
 }
 
+/// Whoever steers has let go of it, such as for the gimbal's own radio control: nothing is said any more.
+#[test]
+fn an_order_that_nobody_repeats_is_let_go() {
+    let mut mount = following();
+    stream(&mut mount, 0, 1_000, point(-10.0, 0.0, YawMode::Follow), READY);
+    let mut sent = Vec::new();
+    for millis in 1_000..5_000 {
+        if mount.poll_timeout(READY).is_some_and(|due| due <= at(millis)) {
+            mount.advance(at(millis), GIMBAL, READY);
+        }
+        sent.extend(drain(&mut mount).into_iter().map(|_| millis));
+    }
+    assert!(sent.last().is_none_or(|last| *last < 1_950), "{sent:?}");
+    assert_eq!((mount.wanted(), mount.poll_timeout(READY)), (None, None));
+}
+
 /// An operation takes its place: the rotation ends before it.
 #[test]
 fn an_order_that_is_dropped_stops_what_turns() {
