@@ -13,7 +13,7 @@ use crate::geometry::{AngularRate, YawFrame};
 use crate::gimbals::operation::{Motors, Operation, OperationError, OperationId, Restart};
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
-use crate::wire::ids::{CommandResult, GimbalFlags};
+use crate::wire::ids::GimbalFlags;
 
 /// Something asked of a gimbal.
 #[derive(Clone, Debug, PartialEq)]
@@ -288,17 +288,4 @@ fn in_frame(yaw_frame: YawFrame) -> Demand {
         YawFrame::Vehicle => GimbalFlags::YAW_IN_VEHICLE_FRAME,
     };
     Demand { flags: GimbalFlags::ROLL_LOCK | GimbalFlags::PITCH_LOCK | frame, ..Demand::default() }
-}
-
-impl NotDone {
-    /// Whether it is not done for the moment only, or would never be.
-    pub fn is_for_the_moment(&self) -> bool {
-        match self {
-            Self::Refused { refusal, .. } => {
-                matches!(refusal.result, CommandResult::TemporarilyRejected | CommandResult::Failed)
-            }
-            Self::TooMuch | Self::Starting | Self::Ending => true,
-            Self::UnknownGimbal | Self::Operation(_) => false,
-        }
-    }
 }
