@@ -1,10 +1,13 @@
 //! `gimbald gimbal NAME …`: shows a gimbal, or asks something of it, through a running daemon.
 
+use std::future::poll_fn;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::task::Poll;
 use std::time::Duration;
 
 use serde_json::Value;
+use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::time::{Instant, sleep_until};
 
 use super::client::{ClientError, Target, printable, printable_text};
@@ -126,28 +129,62 @@ fn number(value: &Value) -> String {
 /// Asks for it once, or as long as it is to last; then, and at Ctrl-C, what turns is stopped.
 async fn carry_out(target: &Target, of_gimbal: &str, act: &Act, token: &Token) -> Result<Vec<u8>, GimbalError> {
     let path = format!("{of_gimbal}/{}", act.action.path_with(act.in_path.as_deref()));
-    let mut answer = target.post(&path, token, act.body.clone()).await?;
-    let Some(lasting) = act.lasting else { return Ok(answer) };
+    let ask = || target.post(&path, token, act.body.clone());
+    let Some(lasting) = act.lasting else { return Ok(ask().await?) };
+    // Before anything turns: whoever ends us from then on ends the rotation.
+    let mut ended = Ended::new().map_err(ClientError::Output)?;
     let end = Instant::now() + lasting;
-    let turning = async {
-        let mut next = end - lasting + REFRESH;
-        while next < end {
-            sleep_until(next).await;
-            answer = target.post(&path, token, act.body.clone()).await?;
-            next += REFRESH;
-        }
-        sleep_until(end).await;
-        Ok::<(), ClientError>(())
-    };
+    let mut answer = Vec::new();
     let turned = tokio::select! {
-        turned = turning => turned,
-        // Whether it came or cannot be waited for: it is not to turn on.
-        _ = tokio::signal::ctrl_c() => Ok(()),
+        first = ask() => {
+            // What was refused turns nothing.
+            answer = first?;
+            tokio::select! {
+                turned = repeat(&ask, end - lasting, end) => turned,
+                () = ended.wait() => Ok(()),
+            }
+        }
+        // Whether it came or not: it is not to turn on.
+        () = ended.wait() => Ok(()),
     };
     let stopped = target.post(&format!("{of_gimbal}/stop"), token, Vec::new()).await;
     turned?;
-    stopped?;
-    Ok(answer)
+    let stopped = stopped?;
+    Ok(if answer.is_empty() { stopped } else { answer })
+}
+
+/// Asks again and again from the first time on until `end`.
+async fn repeat<F>(ask: &impl Fn() -> F, first: Instant, end: Instant) -> Result<(), ClientError>
+where
+    F: Future<Output = Result<Vec<u8>, ClientError>>,
+{
+    let mut next = first + REFRESH;
+    while next < end {
+        sleep_until(next).await;
+        ask().await?;
+        next += REFRESH;
+    }
+    sleep_until(end).await;
+    Ok(())
+}
+
+/// The signals by which a person or a closed terminal ends a command.
+struct Ended([Signal; 3]);
+
+impl Ended {
+    fn new() -> io::Result<Self> {
+        let [interrupt, terminate, hangup] =
+            [SignalKind::interrupt(), SignalKind::terminate(), SignalKind::hangup()].map(signal);
+        Ok(Self([interrupt?, terminate?, hangup?]))
+    }
+
+    async fn wait(&mut self) {
+        poll_fn(|cx| {
+            let any = self.0.iter_mut().any(|signal| signal.poll_recv(cx).is_ready());
+            if any { Poll::Ready(()) } else { Poll::Pending }
+        })
+        .await;
+    }
 }
 
 fn as_it_is(answer: &[u8]) -> String {
