@@ -9,7 +9,7 @@ const PAGE: &str = include_str!("page.html");
 /// name that a gimbal reports became markup, it could neither run nor load anything.
 const POLICY: &str = "default-src 'none'; \
     style-src 'sha256-qktgxO7X3SOGDQ7Tmtw4zR4SqhIYleK/DYmiXfhYbQE='; \
-    script-src 'sha256-qEFPY3idj9nTlQYNxGEyGT9Pk1JyvIpyAplW7bzCBW8='; \
+    script-src 'sha256-tjgR5vIoMxN5xO9Gt7j6/jka9CoONB3H2C0SM0SpOc0='; \
     connect-src 'self'; img-src data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 pub async fn page() -> impl IntoResponse {
