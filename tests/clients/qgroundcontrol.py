@@ -142,13 +142,14 @@ class Operator:
 
     def retracts(self):
         client, active = self.client, self.client.active
+        client.tilt_90()
+        self.camera.wait_at(pitch=-90)
         client.retract()
         if self.rig.kind.tells_retract:
             wait_for("the label 'Retracted'", lambda: active.label == "Retracted", 1)
         else:
             self.camera.wait_at(pitch=0, yaw_vehicle=0)
-        client.center()
-        self.camera.wait_at(pitch=0, yaw_vehicle=0)
+        self.center()
         wait_for("the label 'Yaw follow'", lambda: active.label == "Yaw follow", 1)
         self.expect_no_error()
 
