@@ -1,7 +1,7 @@
 //! Known faults of gimbals and their firmware: recognised, named, and worked round where that can be done.
 
 use gimbald::gimbals::gremsy::parameters::RcType;
-use gimbald::wire::dialect::{MavMessage, STATUSTEXT_DATA};
+use gimbald::wire::dialect::{MavMessage, PARAM_REQUEST_LIST_DATA, STATUSTEXT_DATA};
 use gimbald::wire::ids::message;
 
 use super::*;
@@ -39,7 +39,12 @@ fn statement_31_another_radio_type_is_told_once() {
     for generation in [Generation::V1, Generation::V2] {
         let other = DeviceSettings { rc_type: RcType::Other(15), ..device(generation) };
         let (mut world, places) = switched_on(other, GremsySettings::default());
-        run(&mut world, places, 60 * SECOND);
+        for _ in 0..4 {
+            run(&mut world, places, 15 * SECOND);
+            // A ground station reads all parameters: it is no news.
+            let list = PARAM_REQUEST_LIST_DATA { target_system: 1, target_component: 154 };
+            world.send(places.ground, GCS, &MavMessage::PARAM_REQUEST_LIST(list));
+        }
         assert_eq!(texts(&world, places), ["camera: RC_TYPE is not SYNC, may not move"], "{generation:?}");
         assert_eq!(faults(&world).len(), 1);
         assert!(faults(&world)[0].contains("RC_TYPE is 15, not sync"), "{:?}", faults(&world));
