@@ -3,6 +3,7 @@
 //! The gimbal is a simulated one: silent until it hears a heartbeat, busy for four seconds, slow to answer, and turning on
 //! at a rate that nobody repeats.
 
+mod bad_line;
 mod faults;
 mod operations;
 mod start_up;

@@ -299,7 +299,7 @@ fn without_an_entry_it_is_recognised_by_its_maker() {
     assert_looks(&world, -30.0, 45.0);
 }
 
-/// Five of a hundred frames are lost, some are doubled: it starts all the same, and every mode change succeeds within 3 s.
+/// Five of a hundred frames are lost, some are doubled: it starts all the same, and goes where it is told.
 #[test]
 fn on_a_bad_line_it_starts_and_obeys() {
     for generation in [Generation::V1, Generation::V2] {
