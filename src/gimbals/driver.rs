@@ -37,6 +37,12 @@ pub trait GimbalDriver: std::fmt::Debug {
 
     fn handle_timeout(&mut self, now: Timestamp);
 
+    /// It was told to turn, and that it has stopped is not known, whatever it has been told since; until then the stop is
+    /// to be repeated. `false` where a family has no rotation that outlives what replaces it.
+    fn may_be_turning(&self) -> bool {
+        false
+    }
+
     fn poll_output(&mut self) -> Option<DriverOutput>;
 
     fn poll_timeout(&self) -> Option<Timestamp>;
