@@ -20,6 +20,7 @@ use tokio::time::timeout;
 
 use super::gimbals::unknown_gimbal;
 use super::routes::{Refusal, Window};
+use super::server::Visit;
 use crate::actions::{Action, Wrong};
 use crate::daemon::window::CoreRequest;
 use crate::gimbals::operation::OperationError;
@@ -111,6 +112,9 @@ pub async fn act(
         let params = params.map_err(|_| Refusal::new(StatusCode::BAD_REQUEST, "the path is not UTF-8"))?;
         let param = |name: &str| params.iter().find(|(key, _)| *key == name).map(|(_, value)| value.to_owned());
         let body = read_body(&parts.headers, body, window.controls.patience).await?;
+        if let Some(visit) = parts.extensions.get::<Visit>() {
+            visit.has_asked();
+        }
         let in_path = action.path_field().and_then(|field| param(field.name));
         let asked = action.read(in_path.as_deref(), &body).map_err(|wrong| {
             let status = match wrong {

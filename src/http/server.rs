@@ -2,22 +2,25 @@
 //!
 //! `axum::serve` knows neither time-outs nor a limit of connections, so hyper is driven here. A client may be slow to
 //! ask ([`Limits::header`]), slow to read, or stay ([`Limits::lifetime`]). Of more than [`Limits::connections`] those that
-//! ask for nothing make room for those that come, so that whoever only holds connections open keeps nobody out.
+//! wait for nothing make room for those that come, and the others go with their next answer, so that whoever only holds
+//! connections open, asks on and on, or does not read keeps nobody out.
 
 use std::collections::VecDeque;
 use std::io;
 use std::net::SocketAddr;
 use std::pin::pin;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use axum::Router;
+use hyper::body::Body;
 use hyper::server::conn::http1;
 use hyper::service::{Service, service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use tokio::net::{TcpListener, TcpSocket, TcpStream};
+use tokio::sync::Notify;
 use tokio::task::{AbortHandle, JoinSet};
 use tokio::time::{Instant, sleep, timeout};
 use tracing::{debug, info, warn};
@@ -132,7 +135,7 @@ async fn serve(listener: TcpListener, router: Router, limits: Limits) {
                 failing = false;
                 debug!(%peer, "connection accepted");
                 guests.make_room().await;
-                guests.admit(|is_asking| converse(stream, router.clone(), limits, is_asking));
+                guests.admit(|visit| converse(stream, router.clone(), limits, visit));
             }
             Err(error) => {
                 if !failing {
@@ -146,7 +149,7 @@ async fn serve(listener: TcpListener, router: Router, limits: Limits) {
     }
 }
 
-/// Nobody has to make room for others before he had so long to ask.
+/// Nobody has to make room for others before he had so long to ask, or to read what he was answered.
 const COURTESY: Duration = Duration::from_millis(100);
 
 /// The connections that are served, the oldest first.
@@ -157,21 +160,51 @@ struct Guests {
 }
 
 struct Guest {
-    admitted: Instant,
     task: AbortHandle,
-    is_asking: IsAsking,
+    visit: Visit,
 }
 
-/// Whether a connection has sent a request that is not answered yet.
-type IsAsking = Arc<AtomicBool>;
+/// What a connection and whoever needs its place know of each other.
+#[derive(Clone)]
+pub(super) struct Visit {
+    admitted: Instant,
+    /// Milliseconds after `admitted` since which it waits for nothing from us; [`Self::WAITS`] while it does.
+    idle_since: Arc<AtomicU64>,
+    /// Its place is needed: the next answer is its last.
+    farewell: Arc<Notify>,
+}
+
+impl Visit {
+    const WAITS: u64 = u64::MAX;
+
+    fn begin() -> Self {
+        Self { admitted: Instant::now(), idle_since: Arc::default(), farewell: Arc::default() }
+    }
+
+    /// A request has come whole; from now on the connection waits for us, before we waited for it.
+    pub(super) fn has_asked(&self) {
+        self.idle_since.store(Self::WAITS, Ordering::Relaxed);
+    }
+
+    fn is_answered(&self) {
+        let elapsed = u64::try_from(self.admitted.elapsed().as_millis()).unwrap_or(Self::WAITS - 1);
+        self.idle_since.store(elapsed, Ordering::Relaxed);
+    }
+
+    /// How long it has been waiting for nothing: `None` while it waits for an answer.
+    fn idle(&self) -> Option<Duration> {
+        let since = self.idle_since.load(Ordering::Relaxed);
+        (since != Self::WAITS).then(|| self.admitted.elapsed().saturating_sub(Duration::from_millis(since)))
+    }
+}
 
 impl Guests {
     fn new(most: usize) -> Self {
         Self { most, tasks: JoinSet::new(), guests: VecDeque::new() }
     }
 
-    /// Whoever comes is let in: for him goes who has asked for nothing for the longest time, or else he waits until
-    /// somebody has his answer.
+    /// Whoever comes is let in: for him goes who has waited for nothing for the longest time. Where all wait for answers
+    /// he waits too, and those who were there first go with the next answer that they get.
     async fn make_room(&mut self) {
         loop {
             while self.tasks.try_join_next().is_some() {}
@@ -179,35 +212,44 @@ impl Guests {
             if self.guests.len() < self.most {
                 return;
             }
-            let idle = self.guests.iter().find(|guest| !guest.is_asking.load(Ordering::Relaxed));
-            let patience = idle.map_or(Duration::MAX, |guest| COURTESY.saturating_sub(guest.admitted.elapsed()));
-            if let Some(idle) = idle.filter(|_| patience.is_zero()) {
-                idle.task.abort();
+            let idle = |guest: &Guest| guest.visit.idle().filter(|idle| *idle >= COURTESY);
+            match self.guests.iter().max_by_key(|guest| idle(guest)).filter(|guest| idle(guest).is_some()) {
+                Some(idle) => idle.task.abort(),
+                None => {
+                    let waiting = self.guests.iter().filter(|guest| guest.visit.idle().is_none());
+                    waiting.for_each(|guest| guest.visit.farewell.notify_one());
+                }
             }
-            let patience = if patience.is_zero() { Duration::MAX } else { patience };
             // Only how long it takes matters: who has left is seen above.
-            let _ = timeout(patience, self.tasks.join_next()).await;
+            let _ = timeout(COURTESY, self.tasks.join_next()).await;
         }
     }
 
-    fn admit<F: Future<Output = ()> + Send + 'static>(&mut self, converse: impl FnOnce(IsAsking) -> F) {
-        let is_asking = IsAsking::default();
-        let task = self.tasks.spawn(converse(Arc::clone(&is_asking)));
-        self.guests.push_back(Guest { admitted: Instant::now(), task, is_asking });
+    fn admit<F: Future<Output = ()> + Send + 'static>(&mut self, converse: impl FnOnce(Visit) -> F) {
+        let visit = Visit::begin();
+        let task = self.tasks.spawn(converse(visit.clone()));
+        self.guests.push_back(Guest { task, visit });
     }
 }
 
-async fn converse(stream: TcpStream, router: Router, limits: Limits, is_asking: IsAsking) {
+async fn converse(stream: TcpStream, router: Router, limits: Limits, visit: Visit) {
     if let Err(error) = stream.set_nodelay(true) {
         debug!(%error, "answers may come late");
     }
     let router = TowerToHyperService::new(router);
-    let service = service_fn(move |request| {
-        let (answer, is_asking) = (router.call(request), Arc::clone(&is_asking));
+    let farewell = Arc::clone(&visit.farewell);
+    let service = service_fn(move |mut request: hyper::Request<hyper::body::Incoming>| {
+        let visit = visit.clone();
+        let is_whole = request.body().is_end_stream();
+        // Whoever reads the body says when it is there.
+        request.extensions_mut().insert(visit.clone());
+        let answer = router.call(request);
         async move {
-            is_asking.store(true, Ordering::Relaxed);
+            if is_whole {
+                visit.has_asked();
+            }
             let answer = answer.await;
-            is_asking.store(false, Ordering::Relaxed);
+            visit.is_answered();
             answer
         }
     });
@@ -217,9 +259,10 @@ async fn converse(stream: TcpStream, router: Router, limits: Limits, is_asking: 
         .max_buf_size(REQUEST_BYTES)
         .serve_connection(TokioIo::new(stream), service);
     let mut connection = pin!(connection);
-    let result = match timeout(limits.lifetime, connection.as_mut()).await {
-        Ok(result) => result,
-        Err(_) => {
+    let stay = async { drop(timeout(limits.lifetime, farewell.notified()).await) };
+    let result = tokio::select! {
+        result = connection.as_mut() => result,
+        () = stay => {
             connection.as_mut().graceful_shutdown();
             match timeout(limits.farewell, connection).await {
                 Ok(result) => result,

@@ -255,6 +255,28 @@ fn connections_that_are_answered_are_not_cut() {
     assert_eq!(Answer::read(second).status, 200);
 }
 
+/// Who asks on and on without reading, or sends a body by halves, keeps nobody out.
+#[test]
+fn connections_that_only_keep_us_busy_make_room() {
+    let token: Token = "0123456789abcdef0123456789abcdef".parse().expect("a token");
+    let limits = Limits { connections: 2, header: FOREVER, body: FOREVER, lifetime: FOREVER, ..Limits::default() };
+    // Each answer takes the interval between two snapshots, so these would be there for minutes.
+    let on_and_on = b"GET /api/v1/status HTTP/1.1\r\nHost: localhost\r\n\r\n".repeat(5000);
+    let half = b"POST /api/v1/gimbals/camera/turn HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n\
+        Authorization: Bearer 0123456789abcdef0123456789abcdef\r\nContent-Length: 14\r\n\r\n{\"y";
+    for busy in [&on_and_on[..], half] {
+        let window = Window::controlled(Some(Snapshot::default()), Some(token.clone()), Ok(()), limits);
+        let mut guests: Vec<_> = (0..10).map(|_| window.connect()).collect();
+        for guest in &mut guests {
+            guest.set_nonblocking(true).expect("a flag");
+            // As much as the kernel takes; it may be cut already.
+            let _ = guest.write(busy);
+        }
+
+        assert_eq!(window.get("/healthz").body, "ok");
+    }
+}
+
 /// A client that sends its headers by the byte, or nothing at all, loses its place.
 #[test]
 fn slow_headers_are_cut() {
