@@ -1,4 +1,5 @@
-//! R20: the output of a serial line: whole frames at the speed of the wire, control first, nothing stale.
+//! R20: the output of a serial line: whole frames at the speed of the wire, control first, ours before others', nothing
+//! stale.
 //!
 //! The kernel's buffer would hold a second of frames that nobody can recall. So a frame is given out only when the one
 //! before it has left the wire, and waits here until then, where a newer setpoint can take its place.
@@ -13,7 +14,9 @@ use crate::wire::{Frame, MAX_FRAME_LEN, MavId, Target};
 /// How soon a frame is due on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Priority {
-    /// Commands, their answers, setpoints.
+    /// Our own commands and setpoints: what stops a gimbal waits for nobody who floods the line.
+    OwnControl,
+    /// Others' commands and setpoints, and answers to commands.
     Control,
     /// What is addressed to somebody, and the state that a gimbal needs to stabilise.
     Addressed,
@@ -30,20 +33,22 @@ pub struct ReplaceKey {
 }
 
 /// How soon `frame` is due, and whether a newer one takes its place.
-pub fn classify(frame: &Frame<'_>) -> (Priority, Option<ReplaceKey>) {
+pub fn classify(frame: &Frame<'_>, origin: Origin) -> (Priority, Option<ReplaceKey>) {
+    let demand = if origin == Origin::Own { Priority::OwnControl } else { Priority::Control };
     let key = || Some(ReplaceKey { message_id: frame.message_id(), source: frame.source(), target: frame.target() });
     match frame.message_id() {
         message::COMMAND_INT | message::COMMAND_LONG => match setpoint_command(frame) {
-            true => (Priority::Control, key()),
-            false => (Priority::Control, None),
+            true => (demand, key()),
+            false => (demand, None),
         },
-        message::COMMAND_ACK | message::COMMAND_CANCEL => (Priority::Control, None),
+        message::COMMAND_ACK => (Priority::Control, None),
+        message::COMMAND_CANCEL => (demand, None),
         message::GIMBAL_MANAGER_SET_ATTITUDE
         | message::GIMBAL_DEVICE_SET_ATTITUDE
         | message::GIMBAL_MANAGER_SET_PITCHYAW
         | message::GIMBAL_MANAGER_SET_MANUAL_CONTROL
         | message::MANUAL_CONTROL
-        | message::MOUNT_CONTROL => (Priority::Control, key()),
+        | message::MOUNT_CONTROL => (demand, key()),
         message::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE
         | message::HEARTBEAT
         | message::GIMBAL_MANAGER_STATUS
@@ -78,10 +83,19 @@ pub const MAX_CONTROL_AGE: Duration = Duration::from_millis(2_000);
 
 const SLOTS: usize = 128;
 
-/// So many frames of each priority wait at most; control may take the room of the others.
-const MAX_WAITING: [usize; 3] = [SLOTS, 42, 42];
+const PRIORITIES: usize = 4;
 
-const MAX_AGES: [Duration; 3] = [MAX_CONTROL_AGE, MAX_ADDRESSED_AGE, MAX_BROADCAST_AGE];
+/// So many frames of each priority wait at most; control may take the room of the others.
+const MAX_WAITING: [usize; PRIORITIES] = [32, SLOTS, 42, 42];
+
+/// Others' control may take so many slots from what is addressed.
+const CONTROL_SHARE: usize = 96;
+
+const MAX_AGES: [Duration; PRIORITIES] = [MAX_CONTROL_AGE, MAX_CONTROL_AGE, MAX_ADDRESSED_AGE, MAX_BROADCAST_AGE];
+
+/// So many frames of our own control, and so many of others', leave in a row at most while one of the next priority
+/// waits: commands of others have a share of the line beside ours, and leave one to the state that a gimbal needs.
+const MAX_IN_A_ROW: [u8; 2] = [4, 8];
 
 /// A frame may be given out this much before the wire is free, so that a late wake-up leaves no gap on it.
 const LEAD: Duration = Duration::from_micros(800);
@@ -97,7 +111,9 @@ pub struct SerialQueue {
     line_free_at: Timestamp,
     slots: Vec<Slot>,
     free: Vec<u8>,
-    waiting: [VecDeque<u8>; 3],
+    waiting: [VecDeque<u8>; PRIORITIES],
+    /// How many frames of each control have left since one of the next priority has waited.
+    in_a_row: [u8; MAX_IN_A_ROW.len()],
     dropped: BTreeMap<&'static str, u64>,
 }
 
@@ -138,12 +154,13 @@ impl SerialQueue {
             slots: vec![empty; SLOTS],
             free: (0..SLOTS as u8).rev().collect(),
             waiting: Default::default(),
+            in_a_row: [0; MAX_IN_A_ROW.len()],
             dropped: BTreeMap::new(),
         }
     }
 
     pub fn push(&mut self, now: Timestamp, frame: &Frame<'_>, origin: Origin) {
-        let (priority, key) = classify(frame);
+        let (priority, key) = classify(frame, origin);
         let queue = priority as usize;
         let same = |slot: &u8| key.is_some() && self.slots[usize::from(*slot)].key == key;
         if let Some(slot) = self.waiting[queue].iter().copied().find(same) {
@@ -154,8 +171,7 @@ impl SerialQueue {
         if self.waiting[queue].len() >= MAX_WAITING[queue] {
             self.drop_oldest(queue);
         } else if self.free.is_empty() {
-            let least_urgent = self.waiting.iter().rposition(|queue| !queue.is_empty());
-            self.drop_oldest(least_urgent.expect("the slots that are not free wait in some queue"));
+            self.drop_oldest(self.first_to_give_way());
         }
         let slot = self.free.pop().expect("one was free or has just become so");
         self.fill(slot, now, frame, key, origin);
@@ -194,7 +210,7 @@ impl SerialQueue {
 
     /// The end is near: only control still goes out.
     pub fn keep_control(&mut self) {
-        for queue in 1..self.waiting.len() {
+        for queue in Priority::Addressed as usize..self.waiting.len() {
             while let Some(slot) = self.waiting[queue].pop_front() {
                 self.count(SHUTTING_DOWN);
                 self.free.push(slot);
@@ -208,20 +224,59 @@ impl SerialQueue {
     }
 
     fn next_fresh(&mut self, now: Timestamp) -> Option<u8> {
-        for (queue, max_age) in MAX_AGES.into_iter().enumerate() {
-            while let Some(slot) = self.waiting[queue].pop_front() {
-                if now.since(self.slots[usize::from(slot)].queued_at) <= max_age {
-                    return Some(slot);
-                }
-                self.count(STALE);
-                self.free.push(slot);
+        while let Some(queue) = self.next_queue() {
+            let slot = self.waiting[queue].pop_front()?;
+            if now.since(self.slots[usize::from(slot)].queued_at) <= MAX_AGES[queue] {
+                self.note_departure(queue);
+                return Some(slot);
             }
+            self.count(STALE);
+            self.free.push(slot);
         }
         None
     }
 
+    /// The most urgent of those that wait, unless it has had its run and the next is to have a turn.
+    fn next_queue(&self) -> Option<usize> {
+        let mut queue = self.waiting.iter().position(|queue| !queue.is_empty())?;
+        while MAX_IN_A_ROW.get(queue).is_some_and(|most| self.in_a_row[queue] >= *most) && self.next_waits(queue) {
+            queue += 1;
+        }
+        Some(queue)
+    }
+
+    fn next_waits(&self, queue: usize) -> bool {
+        self.waiting.get(queue + 1).is_some_and(|next| !next.is_empty())
+    }
+
+    fn note_departure(&mut self, queue: usize) {
+        let next_waits = self.next_waits(queue);
+        let more_urgent = queue.min(self.in_a_row.len());
+        self.in_a_row[..more_urgent].fill(0);
+        if let Some(count) = self.in_a_row.get_mut(queue) {
+            *count = if next_waits { *count + 1 } else { 0 };
+        }
+    }
+
+    /// In which queue room is made when all slots are taken: in the least urgent, but a flood of others' commands makes it
+    /// in itself before it takes all from what is addressed.
+    fn first_to_give_way(&self) -> usize {
+        let [_, control, _, broadcast] = &self.waiting;
+        if broadcast.is_empty() && control.len() > CONTROL_SHARE {
+            return Priority::Control as usize;
+        }
+        let least_urgent = self.waiting.iter().rposition(|queue| !queue.is_empty());
+        least_urgent.expect("the slots that are not free wait in some queue")
+    }
+
+    /// Makes room by what is others' and was not about to be replaced; what is ours gives way to nothing of others'.
     fn drop_oldest(&mut self, queue: usize) {
-        if let Some(oldest) = self.waiting[queue].pop_front() {
+        let waiting = &self.waiting[queue];
+        let slot = |slot: &u8| &self.slots[usize::from(*slot)];
+        let others = |at: &u8| slot(at).origin == Origin::Forwarded;
+        let oldest = waiting.iter().position(|at| others(at) && slot(at).key.is_none());
+        let oldest = oldest.or_else(|| waiting.iter().position(others)).unwrap_or(0);
+        if let Some(oldest) = self.waiting[queue].remove(oldest) {
             self.count(QUEUE_FULL);
             self.free.push(oldest);
         }
@@ -243,149 +298,4 @@ impl SerialQueue {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::wire::dialect::{ATTITUDE_DATA, COMMAND_ACK_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA};
-    use crate::wire::{DatagramFrames, encode_to_vec};
-
-    /// "paced to the baud rate": what is given out in a second is what the wire can carry in it.
-    #[test]
-    fn a_full_line_is_filled_and_not_overfilled() {
-        let mut queue = SerialQueue::new(115_200);
-        let mut sent = 0;
-        for millis in 0..1_000 {
-            let now = Timestamp::from_millis(millis);
-            push(&mut queue, now, &attitude(millis as u8));
-            while let Some(bytes) = pop(&mut queue, now) {
-                sent += bytes.len();
-            }
-        }
-        assert!((10_900..=11_520).contains(&sent), "{sent} bytes in a second at 115200 baud");
-    }
-
-    /// "control first": a command waits for nothing but the frame in progress.
-    #[test]
-    fn control_overtakes_telemetry() {
-        let mut queue = SerialQueue::new(115_200);
-        push(&mut queue, Timestamp::ZERO, &attitude(0));
-        push(&mut queue, Timestamp::ZERO, &attitude(1));
-        push(&mut queue, Timestamp::ZERO, &ack(7));
-
-        assert_eq!(pop(&mut queue, Timestamp::ZERO), Some(ack(7)));
-        assert_eq!(pop(&mut queue, Timestamp::ZERO), None);
-        let free = queue.poll_timeout().expect("telemetry waits");
-        assert_eq!(pop(&mut queue, free), Some(attitude(0)));
-    }
-
-    /// "the newest setpoint replaces the queued one".
-    #[test]
-    fn the_newest_setpoint_replaces_the_queued_one() {
-        let mut queue = SerialQueue::new(57_600);
-        push(&mut queue, Timestamp::ZERO, &setpoint(1, 0.1));
-        push(&mut queue, Timestamp::ZERO, &setpoint(2, 0.2));
-
-        assert_eq!(pop(&mut queue, Timestamp::ZERO), Some(setpoint(2, 0.2)));
-        assert_eq!(queue.poll_timeout(), None);
-        assert_eq!(queue.dropped(), &BTreeMap::from([(REPLACED, 1)]));
-    }
-
-    /// "bounded in time": telemetry that could not be sent in time is not sent late.
-    #[test]
-    fn stale_telemetry_is_dropped_and_counted() {
-        let mut queue = SerialQueue::new(57_600);
-        push(&mut queue, Timestamp::ZERO, &attitude(0));
-        push(&mut queue, Timestamp::from_millis(290), &attitude(1));
-
-        assert_eq!(pop(&mut queue, Timestamp::from_millis(301)), Some(attitude(1)));
-        assert_eq!(queue.dropped(), &BTreeMap::from([(STALE, 1)]));
-    }
-
-    /// "old frames discarded on reopening".
-    #[test]
-    fn nothing_waits_over_a_reopening() {
-        let mut queue = SerialQueue::new(57_600);
-        push(&mut queue, Timestamp::ZERO, &ack(1));
-        queue.clear();
-        assert_eq!(pop(&mut queue, Timestamp::from_secs(1)), None);
-        assert_eq!(queue.dropped(), &BTreeMap::from([(LINK_DOWN, 1)]));
-    }
-
-    /// "When a link's output queue is full, stream frames are dropped before COMMAND_*" (Protocol checklist 155).
-    #[test]
-    fn a_full_queue_drops_telemetry_before_control_and_the_oldest_first() {
-        let mut queue = SerialQueue::new(921_600);
-        for n in 0..100 {
-            push(&mut queue, Timestamp::ZERO, &attitude(n));
-            push(&mut queue, Timestamp::ZERO, &ack(n));
-        }
-        assert_eq!(queue.dropped(), &BTreeMap::from([(QUEUE_FULL, 200 - SLOTS as u64)]));
-        let sent = drain(&mut queue);
-        let expected = (0..100).map(ack).chain((72..100).map(attitude));
-        assert_eq!(sent, expected.collect::<Vec<_>>());
-    }
-
-    #[test]
-    fn a_flood_of_control_is_bounded_and_the_newest_frames_stay() {
-        let mut queue = SerialQueue::new(57_600);
-        for n in 0..200 {
-            push(&mut queue, Timestamp::ZERO, &ack(n));
-        }
-        assert_eq!(queue.dropped(), &BTreeMap::from([(QUEUE_FULL, 200 - SLOTS as u64)]));
-        assert_eq!(drain(&mut queue), (72..200).map(ack).collect::<Vec<_>>());
-    }
-
-    /// Everything that waits, at the pace of the line.
-    fn drain(queue: &mut SerialQueue) -> Vec<Vec<u8>> {
-        let mut sent = Vec::new();
-        while let Some(at) = queue.poll_timeout() {
-            sent.extend(pop(queue, at));
-        }
-        sent
-    }
-
-    fn pop(queue: &mut SerialQueue, now: Timestamp) -> Option<Vec<u8>> {
-        queue.pop(now).map(|departure| departure.bytes.to_vec())
-    }
-
-    fn push(queue: &mut SerialQueue, now: Timestamp, bytes: &[u8]) {
-        queue.push(now, &DatagramFrames::new(bytes).next_frame().expect("one frame"), Origin::Forwarded);
-    }
-
-    fn attitude(sequence: u8) -> Vec<u8> {
-        let message = ATTITUDE_DATA {
-            time_boot_ms: 1,
-            roll: 0.0,
-            pitch: 0.0,
-            yaw: 0.0,
-            rollspeed: 0.0,
-            pitchspeed: 0.0,
-            yawspeed: 1.0,
-        };
-        encode_to_vec(MavId::new(1, 1), sequence, &message)
-    }
-
-    fn ack(sequence: u8) -> Vec<u8> {
-        let message = COMMAND_ACK_DATA {
-            command: 1000,
-            result: 0,
-            progress: 255,
-            result_param2: 0,
-            target_system: 1,
-            target_component: 154,
-        };
-        encode_to_vec(MavId::new(255, 190), sequence, &message)
-    }
-
-    fn setpoint(sequence: u8, rate: f32) -> Vec<u8> {
-        let message = GIMBAL_DEVICE_SET_ATTITUDE_DATA {
-            q: [f32::NAN; 4],
-            angular_velocity_x: f32::NAN,
-            angular_velocity_y: rate,
-            angular_velocity_z: 0.0,
-            flags: 44,
-            target_system: 1,
-            target_component: 154,
-        };
-        encode_to_vec(MavId::new(1, 191), sequence, &message)
-    }
-}
+mod tests;

@@ -7,11 +7,14 @@ use gimbald::bridge::settings::{Role, Settings, SystemId, Transport};
 use gimbald::bridge::{Bridge, ChannelId, Input, Output};
 use gimbald::timestamp::Timestamp;
 use gimbald::wire::decoder::Patience;
-use gimbald::wire::{FrameBuffer, StreamDecoder};
+use gimbald::wire::dialect::GIMBAL_DEVICE_SET_ATTITUDE_DATA;
+use gimbald::wire::ids::message;
+use gimbald::wire::{FrameBuffer, MavId, StreamDecoder};
 
 use crate::support::line::{Line, Offer, RECEIVER, control, control_waits, percentile, traffic};
+use crate::support::script::{pitchyaw, set_interval};
 use crate::support::wire::Random;
-use crate::support::world::{heartbeat, link};
+use crate::support::world::{Arrival, GCS, GIMBAL, MANAGER, World, heartbeat, link, three_links};
 
 /// How late the core is woken at most; a machine that flies is busy.
 const WORST_WAKE_UP_US: u64 = 300;
@@ -101,6 +104,37 @@ fn item_155_telemetry_gives_way_to_commands() {
     let offered_at: Vec<Timestamp> = telemetry.map(|offer| offer.at).collect();
     assert_eq!(rig.elsewhere, offered_at, "the other link gets all of it at once");
     rig.check_accounts(&offers);
+}
+
+/// R20: "so that a gimbal is stopped however much others send it": with 3000 commands a second offered to a gimbal's line, ours
+/// wait for little more than the frame in progress, and the gimbal still hears its manager's heartbeat.
+#[test]
+fn our_stop_passes_a_flood_of_commands() {
+    let mut settings = three_links();
+    settings.links[1].transport = Transport::Serial { baud: 115_200 };
+    let (mut world, places) = World::with_one_gimbal(settings);
+    let flooder = MavId::new(253, 190);
+    let flood = set_interval(GIMBAL, 27, 100_000.0);
+    let every = Duration::from_micros(333);
+    let turn = |rate: f32| pitchyaw(f32::NAN, f32::NAN, 0.0, rate, 44.0);
+    world.send(places.ground, GCS, &turn(5.0));
+    world.run_with(Duration::from_millis(2_100), &[(every, places.ground, flooder, flood.clone())]);
+    let arrivals = world.take(places.gimbal);
+    let beats = arrivals.iter().filter(|arrival| arrival.source() == MANAGER && arrival.id() == message::HEARTBEAT);
+    assert_eq!(beats.count(), 2, "one a second");
+
+    let asked_at = world.now;
+    world.send(places.ground, GCS, &turn(0.0));
+    world.run_with(Duration::from_millis(100), &[(every, places.ground, flooder, flood)]);
+    let arrivals = world.take(places.gimbal);
+    let is_stop = |arrival: &&Arrival| {
+        arrival.id() == message::GIMBAL_DEVICE_SET_ATTITUDE
+            && arrival.decode::<GIMBAL_DEVICE_SET_ATTITUDE_DATA>().angular_velocity_z == 0.0
+    };
+    let stop = arrivals.iter().find(is_stop).expect("the gimbal is stopped");
+    assert!(stop.at.since(asked_at) < Duration::from_millis(10), "after {:?}", stop.at.since(asked_at));
+    let foreign = arrivals.iter().filter(|arrival| arrival.source() == flooder).count();
+    assert!(foreign > 10, "others have their share: {foreign}");
 }
 
 /// "old frames discarded on reopening": what waited when the line went down is counted and not sent later.
