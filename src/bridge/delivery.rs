@@ -14,7 +14,7 @@ use crate::wire::dialect::{HEARTBEAT_DATA, REQUEST_DATA_STREAM_DATA, SYSTEM_TIME
 use crate::wire::ids::{command, component, mav_autopilot, mav_type, message};
 use crate::wire::{Frame, MavId, Target};
 
-/// A system whose autopilot was not heard for so long is not taken for a vehicle any more.
+/// A vehicle whose autopilot was not heard for so long is not there any more.
 const VEHICLE_GONE: Duration = Duration::from_secs(10);
 
 /// An autopilot silent on its own link for so long is believed on others.
@@ -136,7 +136,7 @@ impl Bridge {
         if !is_autopilot || source.system == 0 {
             return;
         }
-        let was_known = self.is_vehicle(now, source.system);
+        let was_known = self.vehicles[usize::from(source.system)].is_some();
         let known = &mut self.vehicles[usize::from(source.system)];
         let is_first = source.component == component::AUTOPILOT1;
         *known = Some(KnownVehicle {
@@ -286,8 +286,13 @@ impl Bridge {
     }
 
     /// D5: whether `id` is in a system that has an autopilot and is not ours.
-    pub(super) fn is_other_vehicle(&self, now: Timestamp, id: MavId) -> bool {
-        Some(id.system) != self.identity.system() && self.is_vehicle(now, id.system)
+    ///
+    /// Once its autopilot was heard it has one for good, however rarely we hear it; and who has an autopilot's component id
+    /// is one, with or without a heartbeat. Only who calls itself a ground station is believed when no autopilot is heard.
+    fn is_other_vehicle(&self, now: Timestamp, id: MavId) -> bool {
+        let was_one = id.component == component::AUTOPILOT1 || self.vehicles[usize::from(id.system)].is_some();
+        Some(id.system) != self.identity.system()
+            && (self.is_vehicle(now, id.system) || was_one && !self.ranks.is_ground_station(id))
     }
 
     fn is_state_for_gimbals(&self, frame: &Frame<'_>) -> bool {

@@ -82,7 +82,7 @@ impl Bridge {
         let source = frame.source();
         if !self.is_believed(role, source.system) {
             // Where ground stations are it is another vehicle's; elsewhere only if that vehicle is there.
-            if role != Role::Ground && source.system != system && !self.is_other_vehicle(now, source) {
+            if role != Role::Ground && source.system != system && !self.is_vehicle(now, source.system) {
                 self.conflicts.note(now, Conflict::ForeignSystem { device: source, system, is_managed: false });
             }
             return;

@@ -31,6 +31,9 @@ impl Bridge {
         self.ranks.set_own_system(system);
         if let Some(before) = before {
             self.router.forget_system(before);
+            // It was our vehicle, under the id that it had then, and not another.
+            let known = &mut self.vehicles[usize::from(before)];
+            *known = known.filter(|known| known.is_on_ground_only);
             let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
             for gimbal in self.roster.iter_mut() {
                 gimbal.manager.forget_system(now, before, around);

@@ -55,9 +55,14 @@ impl Ranks {
         }
     }
 
+    /// Whether `id` said last that it is a ground station.
+    pub fn is_ground_station(&self, id: MavId) -> bool {
+        self.ground_stations.iter().any(|(station, _)| *station == id)
+    }
+
     /// The rank of `id`, where `autopilot` is our system's.
     pub fn of(&self, id: MavId, autopilot: Option<MavId>) -> Rank {
-        if self.ground_stations.iter().any(|(station, _)| *station == id) {
+        if self.is_ground_station(id) {
             Rank::GroundStation
         } else if autopilot == Some(id) {
             Rank::Autopilot

@@ -24,7 +24,7 @@ use crate::support::wire::checksum;
 use crate::support::world::{AUTOPILOT, Arrival, GCS, GIMBAL, MANAGER, Places, World, three_links};
 
 /// Those who ask, the last of them from a system that nobody knows.
-const SENDERS: [MavId; 5] = [GCS, MavId::new(255, 191), MavId::new(1, 192), AUTOPILOT, MavId::new(77, 1)];
+const SENDERS: [MavId; 5] = [GCS, MavId::new(255, 191), MavId::new(1, 192), AUTOPILOT, MavId::new(77, 191)];
 
 /// One thing that happens.
 #[derive(Clone, Debug)]

@@ -1,5 +1,6 @@
 //! What must not move the gimbal, and what must stop it: somebody vanishes, restarts, is unplugged, or pretends.
 
+use crate::support::script::ground_heartbeat;
 use gimbald::bridge::Input;
 use gimbald::bridge::settings::{Settings, Transport};
 use gimbald::manager::settings::ControlSettings;
@@ -245,18 +246,47 @@ fn a_gimbal_is_where_it_was_heard_first() {
 /// D5: "Other vehicles' systems are routed, but never gate, latch or steer", also what they took before they were known
 /// as such; and one stray heartbeat does not bar a ground station for ever.
 #[test]
-fn d5_another_vehicle_loses_what_it_took_and_is_forgotten_when_it_is_gone() {
+fn d5_another_vehicle_loses_what_it_took_and_bars_no_ground_station_when_it_is_gone() {
     let (mut world, places) = with_gimbal();
-    let stranger = MavId::new(2, 1);
+    let stranger = MavId::new(2, 192);
+    let station = MavId::new(2, 190);
     let take = configure([-2.0, -2.0], [-1.0, -1.0]);
     assert_eq!(world.result_of(places.ground, stranger, &take), Some(ACCEPTED));
 
-    world.send(places.ground, stranger, &px4_heartbeat());
+    world.send(places.ground, MavId::new(2, 1), &px4_heartbeat());
     assert_eq!(world.snapshot().gimbals[0].primary, None);
-    assert_eq!(world.result_of(places.ground, stranger, &take), Some(DENIED));
+    world.send(places.ground, station, &ground_heartbeat());
+    for sender in [stranger, station] {
+        assert_eq!(world.result_of(places.ground, sender, &take), Some(DENIED), "{sender}");
+    }
 
     run_looking(&mut world, places, 10 * SECOND, 0.0, 0.0);
-    assert_eq!(world.result_of(places.ground, MavId::new(2, 190), &take), Some(ACCEPTED));
+    assert_eq!(world.result_of(places.ground, stranger, &take), Some(DENIED), "its vehicle may be out of earshot");
+    assert_eq!(world.result_of(places.ground, station, &take), Some(ACCEPTED));
+}
+
+/// D5: "Other vehicles' systems are routed, but never gate, latch or steer", whether their autopilot beats where we hear it or
+/// not; a ground station is none, whatever its ids.
+#[test]
+fn d5_a_silent_autopilot_of_another_system_is_another_vehicle() {
+    let (mut world, places) = with_gimbal();
+    look(&mut world, places, 0.0, 0.0);
+    world.forget();
+    let [other, old_station] = [MavId::new(2, 1), MavId::new(255, 1)];
+    let take = configure([-2.0, -2.0], [-1.0, -1.0]);
+    let angle = pitchyaw(-10.0, 10.0, NAN, NAN, 44.0);
+    for demand in [&take, &angle] {
+        assert_eq!(world.result_of(places.ground, other, demand), Some(DENIED));
+    }
+    world.send(places.ground, other, &set_pitchyaw(-0.2, 0.0, NAN, NAN, 44));
+    world.run_for(SECOND);
+    assert_eq!(world.snapshot().gimbals[0].rejected["2/1"]["other_vehicle"], 3);
+    assert_eq!(setpoints(&mut world, places), []);
+
+    world.send(places.ground, old_station, &ground_heartbeat());
+    for sender in [old_station, GCS] {
+        assert_eq!(world.result_of(places.ground, sender, &take), Some(ACCEPTED), "{sender}");
+    }
 }
 
 /// Numbers that no gimbal can follow are refused before they are reckoned with.

@@ -69,9 +69,9 @@ fn control_that_is_lost_is_an_event() {
     assert_eq!((told.who, told.from, told.to), (Some(GCS.to_string()), Some(GCS.to_string()), None));
     assert_eq!(told.at_s - taken.uptime_s, 10.0);
 
-    let other = MavId::new(9, 1);
+    let other = MavId::new(9, 192);
     assert_eq!(world.result_of(places.ground, other, &take_control()), Some(ACCEPTED));
-    world.send(places.ground, other, &px4_heartbeat());
+    world.send(places.ground, MavId::new(9, 1), &px4_heartbeat());
     let told = latest(&world);
     assert_eq!((told.what.as_str(), told.who), ("system_gone", Some(other.to_string())));
 }
