@@ -256,10 +256,25 @@ impl Finding {
         let endpoint = toml::Value::String(format!("serial:{path}:{}", self.baud));
         let parties: String = self.parties.iter().map(|(id, party)| format!("  {id}: {party}\n")).collect();
         let name = names.take(role);
+        let gimbals = self.gimbal_entries(&name, names);
         format!(
-            "{path}: {} baud\n{parties}\n[[link]]\nname = \"{name}\"\nrole = \"{role}\"\nendpoint = {endpoint}\n",
+            "{path}: {} baud\n{parties}\n[[link]]\nname = \"{name}\"\nrole = \"{role}\"\nendpoint = {endpoint}\n{gimbals}",
             self.baud
         )
+    }
+
+    /// An entry for each gimbal on `link`; of several, each is named by its component.
+    fn gimbal_entries(&self, link: &str, names: &mut Names) -> String {
+        let gimbals: Vec<_> = self.parties.iter().filter(|(_, party)| party.is_gimbal()).collect();
+        let entry = |(id, party): &(&MavId, &Party)| {
+            let name = names.take("camera");
+            // What is in doubt the daemon finds out.
+            let family = party.family().map(|family| format!("family = \"{}\"\n", family.name())).unwrap_or_default();
+            let component =
+                if gimbals.len() > 1 { format!("component_id = {}\n", id.component) } else { String::new() };
+            format!("\n[[gimbal]]\nname = \"{name}\"\nlink = \"{link}\"\n{family}{component}")
+        };
+        gimbals.iter().map(entry).collect()
     }
 }
 
@@ -422,7 +437,8 @@ mod tests {
         (result, text(output), text(errors))
     }
 
-    /// "Reports device, baud, system/component, family, vendor, model, firmware, and the [[link]] lines to paste."
+    /// "Reports device, baud, system/component, family, vendor, model, firmware, and the [[link]] lines to paste", with
+    /// those that name the gimbal.
     #[test]
     fn a_gimbal_is_found_at_its_baud_rate() {
         let settings = DeviceSettings { listens_first: None, ..DeviceSettings::default() };
@@ -437,7 +453,8 @@ mod tests {
         let shown = path.display();
         let expected = format!(
             "{shown}: 921600 baud\n  1/154: mavlink_v2, gimbald, Simulated v2, firmware 1.0.0\n\n\
-             [[link]]\nname = \"gimbal\"\nrole = \"gimbal\"\nendpoint = \"serial:{shown}:921600\"\n\n"
+             [[link]]\nname = \"gimbal\"\nrole = \"gimbal\"\nendpoint = \"serial:{shown}:921600\"\n\n\
+             [[gimbal]]\nname = \"camera\"\nlink = \"gimbal\"\nfamily = \"mavlink_v2\"\n\n"
         );
         assert_eq!(output, expected);
         assert_eq!(errors, format!("{shown}: 115200 baud …\n{shown}: 921600 baud …\n"));
@@ -522,6 +539,25 @@ mod tests {
         assert_eq!(party.to_string(), "mavlink_v2, which does not tell its make");
         party.identity = Some(identity);
         assert_eq!(party.to_string(), "mavlink_v2, a\u{fffd}b");
+    }
+
+    /// Of two gimbals on one line each has its component; what only beats may be of any family.
+    #[test]
+    fn each_gimbal_has_an_entry() {
+        let mut v2 = Party::default();
+        v2.is_gimbal_device = true;
+        let beats = Party::beating_as_gimbal();
+        let port = Port { name: "/dev/ttyUSB0".into(), device: "/dev/ttyUSB0".into() };
+        let parties = [(MavId::new(1, 154), v2), (MavId::new(1, 171), beats)].into();
+        let finding = Finding { port, baud: 115_200, parties };
+
+        let entries = finding.gimbal_entries("gimbal", &mut Names::default());
+
+        assert_eq!(
+            entries,
+            "\n[[gimbal]]\nname = \"camera\"\nlink = \"gimbal\"\nfamily = \"mavlink_v2\"\ncomponent_id = 154\n\
+             \n[[gimbal]]\nname = \"camera-2\"\nlink = \"gimbal\"\ncomponent_id = 171\n"
+        );
     }
 
     #[test]

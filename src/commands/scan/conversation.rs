@@ -106,6 +106,21 @@ impl Party {
         }
     }
 
+    /// What its entry in the configuration says; `None` in doubt.
+    pub fn family(&self) -> Option<Family> {
+        match (self.is_gremsy(), self.is_gimbal_device) {
+            _ if self.is_doubtful() => None,
+            (true, _) => Some(Family::Gremsy),
+            (false, true) => Some(Family::MavlinkV2),
+            (false, false) => Some(Family::MavlinkV1),
+        }
+    }
+
+    #[cfg(test)]
+    pub fn beating_as_gimbal() -> Self {
+        Self { heartbeat: Some((mav_type::GIMBAL, mav_autopilot::INVALID)), ..Self::default() }
+    }
+
     /// Nothing that it said tells a v1 gimbal from a v2 device that has not answered yet.
     pub fn is_doubtful(&self) -> bool {
         self.beats_as_gimbal() && !self.is_gimbal_device && self.table.is_none() && !self.tells_v1_attitude

@@ -21,10 +21,13 @@ pub struct Port {
     pub device: PathBuf,
 }
 
+/// A running gimbald is asked at its page, which may be elsewhere.
+const ASK_IT: &str = "; if it is the service, name its page with --url, and it is asked what is there";
+
 /// Why a port is not tried.
 #[derive(Debug, thiserror::Error)]
 pub enum PortError {
-    #[error("in use by {name} (process {process})")]
+    #[error("in use by {name} (process {process}){}", if name == "gimbald" { ASK_IT } else { "" })]
     HeldBy { process: u32, name: String },
     #[error("in use by another process")]
     InUse,
@@ -79,9 +82,9 @@ fn without_waiting(device: &Path) -> io::Result<File> {
 fn refused(error: &io::Error) -> PortError {
     match error.raw_os_error().map(Errno::from_raw) {
         Some(Errno::EBUSY) => PortError::InUse,
-        Some(Errno::EACCES) => {
-            PortError::Open("permission denied; members of the port's group (ls -l) may open it".to_owned())
-        }
+        Some(Errno::EACCES) => PortError::Open(
+            "permission denied; run it with sudo, or as a member of the port's group (ls -l)".to_owned(),
+        ),
         // A port without hardware, as boards announce many of.
         Some(Errno::ENXIO | Errno::ENODEV | Errno::EIO) => PortError::NotASerialPort,
         Some(errno) => PortError::Open(errno.desc().to_owned()),
@@ -216,5 +219,16 @@ mod tests {
         let text = refused.map(|_| ()).expect_err("it is held").to_string();
         assert_eq!(text, format!("in use by sleep (process {})", other.id()));
         port.open(115_200).expect("it is free again");
+    }
+
+    /// A daemon whose page is elsewhere was not asked.
+    #[test]
+    fn a_running_gimbald_can_be_asked() {
+        let told = |name: &str| PortError::HeldBy { process: 7, name: name.to_owned() }.to_string();
+        assert_eq!(told("minicom"), "in use by minicom (process 7)");
+        assert_eq!(
+            told("gimbald"),
+            "in use by gimbald (process 7); if it is the service, name its page with --url, and it is asked what is there"
+        );
     }
 }
