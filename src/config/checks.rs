@@ -8,13 +8,14 @@ use std::path::PathBuf;
 use crate::bridge::settings::Role;
 use crate::channel::ChannelId;
 use crate::endpoint::Endpoint;
+use crate::gimbals::settings::Family;
 use crate::token::Token;
 
 use super::environment::spelling;
 use super::numbering;
 use super::problem::{Place, Problem};
 use super::reader::{Located, bare};
-use super::schema::{Configuration, Http, Link};
+use super::schema::{Configuration, Gimbal, Http, Link};
 use super::settings::HttpSettings;
 use super::suggestion;
 
@@ -57,10 +58,41 @@ pub(super) fn check(configuration: &Configuration, problems: &mut Vec<Problem>) 
     if let Some(presents) = presents.filter(|_| !has_autopilot) {
         problems.push(presents.problem(format!("found {}", presents.shown), "false, or a link of role autopilot"));
     }
+    gimbals.iter().for_each(|gimbal| check_family(gimbal, problems));
     numbering::check(gimbals, presents.is_some(), problems);
     // Every endpoint is compared with every other: not with those that cannot stay.
     check_endpoints(&links[..links.len().min(MAX_LINKS)], http, problems);
     read_token(http, problems)
+}
+
+/// A key that the gimbal's family does not know says nothing, whatever was meant by it. Where the family is found out,
+/// every key may have its turn.
+fn check_family(gimbal: &Gimbal, problems: &mut Vec<Problem>) {
+    let Some(family) = gimbal.family.as_ref().filter(|family| family.value != Family::Auto) else { return };
+    let of_v1 = [
+        without_effect(gimbal.v1_sign.as_ref()),
+        without_effect(gimbal.v1_report_sign.as_ref()),
+        without_effect(gimbal.v1_configure.as_ref()),
+        without_effect(gimbal.v1_radio_control.as_ref()),
+    ];
+    let of_gremsy = [
+        without_effect(gimbal.gremsy_generation.as_ref()),
+        without_effect(gimbal.gremsy_report_sign.as_ref()),
+        without_effect(gimbal.retract_allowed.as_ref()),
+        without_effect(gimbal.stow_pitch_deg.as_ref()),
+        without_effect(gimbal.stow_yaw_deg.as_ref()),
+    ];
+    let of_v1 = of_v1.into_iter().flatten().map(|problem| (problem, Family::MavlinkV1));
+    let of_gremsy = of_gremsy.into_iter().flatten().map(|problem| (problem, Family::Gremsy));
+    for (problem, of) in of_v1.chain(of_gremsy).filter(|(_, of)| *of != family.value) {
+        let found = format!("{}, which has no effect with family = \"{}\"", problem.found, family.value.name());
+        let expected = format!("family = \"{}\" or \"auto\", or no such key", of.name());
+        problems.push(Problem { found, expected, ..problem });
+    }
+}
+
+fn without_effect<T>(key: Option<&Located<T>>) -> Option<Problem> {
+    key.map(|key| key.problem(format!("found {}", key.shown), ""))
 }
 
 /// Names differ in more than a variable can tell.

@@ -51,11 +51,17 @@ fn too_large() -> Problem {
 }
 
 fn unreadable(error: &io::Error) -> Problem {
-    let found = match error.kind() {
-        io::ErrorKind::NotFound => "no such file".to_owned(),
-        _ => format!("cannot be read: {error}"),
-    };
-    problem(Place::File, found, "a readable TOML file")
+    match error.kind() {
+        io::ErrorKind::NotFound => problem(
+            Place::File,
+            "no such file".to_owned(),
+            "a readable TOML file: name it with --config, or install config/gimbald.toml there",
+        ),
+        io::ErrorKind::PermissionDenied => {
+            problem(Place::File, "may not be read".to_owned(), "a readable TOML file: run this with sudo")
+        }
+        _ => problem(Place::File, format!("cannot be read: {error}"), "a readable TOML file"),
+    }
 }
 
 fn not_utf8(error: &std::string::FromUtf8Error) -> Problem {

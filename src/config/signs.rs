@@ -3,7 +3,8 @@
 use crate::gimbals::signs::{Sign, Signs};
 
 use super::document::{Raw, Table};
-use super::reader::{Expected, number, text, word};
+use super::reader::{Expected, bare, number, text, word};
+use super::suggestion;
 
 const WORDS: &[(&str, Signs)] = &[("normal", Signs::NORMAL), ("reversed", Signs::REVERSED)];
 
@@ -26,18 +27,23 @@ pub(super) fn signs_or_auto(raw: &Raw) -> Result<Option<Signs>, Expected> {
 
 fn axes(table: &Table) -> Result<Signs, Expected> {
     let mut signs = Signs::NORMAL;
+    let mut wrong = Vec::new();
     for (key, value) in table {
         let axis = match key.as_str() {
             "roll" => &mut signs.roll,
             "pitch" => &mut signs.pitch,
             "yaw" => &mut signs.yaw,
-            _ => return Err(Expected::new("a table with roll, pitch and yaw")),
+            _ => {
+                let hint = suggestion::hint(key, ["roll", "pitch", "yaw"]);
+                wrong.push(format!("roll, pitch or yaw in the place of {}{hint}", bare(key)));
+                continue;
+            }
         };
-        *axis = match number(&value.raw, &(-1.0..=1.0)) {
-            Some(1.0) => Sign::Same,
-            Some(-1.0) => Sign::Opposite,
-            _ => return Err(Expected(format!("1 or -1 for {key}"))),
-        };
+        match number(&value.raw, &(-1.0..=1.0)) {
+            Some(1.0) => *axis = Sign::Same,
+            Some(-1.0) => *axis = Sign::Opposite,
+            _ => wrong.push(format!("1 or -1 for {key}, not {}", value.raw)),
+        }
     }
-    Ok(signs)
+    if wrong.is_empty() { Ok(signs) } else { Err(Expected(wrong.join("; "))) }
 }

@@ -119,7 +119,11 @@ fn a_file_that_cannot_be_read_is_a_problem_of_the_configuration() {
     let check = |name| gimbald(folder.path(), &["check", "--config", name], &[]);
     fs::write(folder.path().join("latin1.toml"), b"# a\n# caf\xe9\n").expect("a writable folder");
 
-    assert_eq!(check("absent.toml"), refused(&["absent.toml: no such file; expected a readable TOML file"]));
+    assert_eq!(
+        check("absent.toml"),
+        refused(&["absent.toml: no such file; expected a readable TOML file: name it with --config, or install \
+             config/gimbald.toml there"])
+    );
     assert_eq!(
         check("latin1.toml"),
         refused(&["latin1.toml:2: a byte that is not UTF-8; expected a TOML file in UTF-8"])
@@ -246,9 +250,15 @@ fn numbers_have_ranges_and_kinds() {
             "v1_sign = \"negated\"",
             "found \"negated\"; expected normal or reversed, or a table such as { pitch = -1, yaw = -1 }",
         ),
-        ("v1_sign = { pitch = -2 }", "found a table; expected 1 or -1 for pitch"),
-        ("v1_sign = { pitch = \"-1\" }", "found a table; expected 1 or -1 for pitch"),
-        ("v1_report_sign = { tilt = -1 }", "found a table; expected a table with roll, pitch and yaw"),
+        ("v1_sign = { pitch = -2 }", "found a table; expected 1 or -1 for pitch, not -2"),
+        ("v1_sign = { pitch = 0 }", "found a table; expected 1 or -1 for pitch, not 0"),
+        ("v1_sign = { pitch = \"-1\" }", "found a table; expected 1 or -1 for pitch, not \"-1\""),
+        ("v1_report_sign = { tilt = -1 }", "found a table; expected roll, pitch or yaw in the place of tilt"),
+        (
+            "v1_report_sign = { pitch = -2, yow = 1, roll = 4 }",
+            "found a table; expected 1 or -1 for pitch, not -2; 1 or -1 for roll, not 4; roll, pitch or yaw in the place \
+             of yow; did you mean yaw?",
+        ),
         ("v1_report_sign = -1", "found -1; expected normal or reversed, or a table such as { pitch = -1, yaw = -1 }"),
         ("v1_status = 10", "found 10; expected true or false"),
         ("v1_configure = \"px4\"", "found \"px4\"; expected true or false"),
@@ -357,6 +367,34 @@ fn gimbals_that_are_no_v2_devices_have_numbers() {
         &["c.toml:8: gimbal.a.device_yaw_frame: found \"earth\", which a gimbal of this family cannot have; expected \
              auto or vehicle"],
     );
+}
+
+/// "Bad input gets a clear error naming the place and the remedy": a key that another family has is not passed over.
+#[test]
+fn keys_of_another_family_are_refused() {
+    let entry = |family: &str, lines: &str| format!("[[gimbal]]\nname = \"a\"\nfamily = \"{family}\"\n{lines}");
+    let of_v1 = "v1_sign = \"reversed\"\nv1_configure = true\n";
+    let of_gremsy = "gremsy_generation = \"v1\"\nretract_allowed = true\n";
+    for (family, lines) in [("mavlink_v1", of_v1), ("gremsy", of_gremsy), ("auto", of_v1), ("auto", of_gremsy)] {
+        assert_eq!(check(&format!("{LINK}{}", entry(family, lines)), &[]).code, Some(0), "{family} {lines}");
+    }
+    for (family, lines, other, found) in [
+        ("mavlink_v2", of_gremsy, "gremsy", [("gremsy_generation", "\"v1\""), ("retract_allowed", "true")]),
+        ("mavlink_v1", of_gremsy, "gremsy", [("gremsy_generation", "\"v1\""), ("retract_allowed", "true")]),
+        ("gremsy", of_v1, "mavlink_v1", [("v1_sign", "\"reversed\""), ("v1_configure", "true")]),
+        ("mavlink_v2", of_v1, "mavlink_v1", [("v1_sign", "\"reversed\""), ("v1_configure", "true")]),
+    ] {
+        let lines_told: Vec<String> = (8..)
+            .zip(found)
+            .map(|(line, (key, value))| {
+                format!(
+                    "c.toml:{line}: gimbal.a.{key}: found {value}, which has no effect with family = \"{family}\"; \
+                     expected family = \"{other}\" or \"auto\", or no such key"
+                )
+            })
+            .collect();
+        assert_refused(&entry(family, lines), &lines_told.iter().map(String::as_str).collect::<Vec<_>>());
+    }
 }
 
 #[test]
@@ -640,7 +678,7 @@ max_rate_hz = { 285 = 4, 281 = 0.5 }
 [[gimbal]]
 name = "nose-cam"
 link = "ground"
-family = "mavlink_v2"
+family = "auto"
 component_id = 171
 manager_component_id = 200
 takeover = "ask"
@@ -711,7 +749,7 @@ fn every_key_arrives_where_it_belongs() {
             ],
             gimbals: vec![GimbalSettings {
                 name: "nose-cam".to_owned(),
-                family: Family::MavlinkV2,
+                family: Family::Auto,
                 link: Some(2),
                 component_id: Some(171),
                 manager_component_id: Some(200),
@@ -826,7 +864,7 @@ fn variables_override_the_file() {
         ("GIMBALD__LINK__Ground__ROLE", "ground"),
         ("GIMBALD__LINK__GROUND__ENDPOINT", "udpbcast:10.0.0.255:14550"),
         ("GIMBALD__GIMBAL__NOSE_CAM__LINK", "ground"),
-        ("GIMBALD__GIMBAL__NOSE_CAM__FAMILY", "mavlink_v2"),
+        ("GIMBALD__GIMBAL__NOSE_CAM__FAMILY", "auto"),
         ("GIMBALD__GIMBAL__NOSE_CAM__COMPONENT_ID", "171"),
         ("GIMBALD__GIMBAL__nose_cam__MANAGER_COMPONENT_ID", "200"),
         ("GIMBALD__GIMBAL__NOSE-CAM__TAKEOVER", "ask"),
@@ -875,6 +913,7 @@ endpoint = "udpin:0.0.0.0:1"
 max_rate_hz = { 285 = 4, 281 = 0.5 }
 [[gimbal]]
 name = "nose-cam"
+family = "mavlink_v2"
 takeover = "open"
 "#;
 
