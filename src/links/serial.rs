@@ -1,6 +1,7 @@
 //! `serial`: a serial port or pseudo-terminal, which may go and come back at any time.
 
 use std::io;
+use std::path::Path;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
@@ -70,10 +71,18 @@ impl SerialLink {
             }
             Err(error) => {
                 self.state = State::Closed { retry_at: self.backoff.failed(now) };
-                inbox.down(format!("cannot open {}: {}", self.path, cause(&error)));
+                inbox.down(format!("cannot open {}: {}", self.path, why_closed(&self.path, &error)));
             }
         }
     }
+}
+
+/// The library calls a lock, and a port that was opened for its holder alone, a device that is not there.
+fn why_closed(path: &str, error: &io::Error) -> String {
+    if error.kind() == io::ErrorKind::NotFound && Path::new(path).exists() {
+        return "another program holds it; gimbald scan names it".to_owned();
+    }
+    cause(error)
 }
 
 impl Port {
@@ -204,7 +213,7 @@ mod tests {
     use std::io::Write;
     use std::os::fd::AsFd;
     use std::os::unix::fs::symlink;
-    use std::path::{Path, PathBuf};
+    use std::path::PathBuf;
 
     use nix::fcntl::{FcntlArg, OFlag, fcntl};
     use nix::pty::{OpenptyResult, openpty};
@@ -212,6 +221,21 @@ mod tests {
 
     use super::super::harness::{Rig, Seen, noise, read_available, write_aside};
     use super::*;
+
+    /// The library speaks of a lock.
+    #[test]
+    fn a_port_that_somebody_holds_is_said_to_be_held() {
+        let OpenptyResult { master: _master, slave } = openpty(None, None).expect("a pseudo-terminal");
+        let path = ttyname(slave.as_fd()).expect("it has a name");
+        let path = path.to_str().expect("UTF-8");
+        let _holder = serial_port::open(path, 115_200).expect("it is free");
+
+        let error = serial_port::open(path, 115_200).map(|_| ()).expect_err("it is held");
+
+        assert_eq!(why_closed(path, &error.into()), "another program holds it; gimbald scan names it");
+        let gone = io::Error::new(io::ErrorKind::NotFound, "No such file or directory");
+        assert_eq!(why_closed("/nowhere/gimbal", &gone), "no such file or directory");
+    }
 
     /// A pseudo-terminal that can be pulled and plugged in again behind a path that stays.
     struct Cable {
