@@ -334,15 +334,15 @@ pub struct GimbalArgs {
     #[arg(value_name = "NAME")]
     pub name: String,
 
-    /// Where the daemon's page is
-    #[arg(long, global = true, display_order = 100, value_name = "URL", default_value_t = format!("http://{}", HttpSettings::DEFAULT_LISTEN))]
-    pub url: String,
+    /// Where the daemon's page is; without it, where GIMBALD__HTTP__LISTEN or the configuration has it
+    #[arg(long, global = true, display_order = 100, value_name = "URL")]
+    pub url: Option<String>,
 
     /// The file with the token of those who may control gimbals
     #[arg(long, global = true, display_order = 100, value_name = "FILE")]
     pub token_file: Option<PathBuf>,
 
-    /// The configuration that names it otherwise
+    /// The configuration that names both otherwise
     #[arg(long, global = true, display_order = 100, value_name = "FILE", default_value = DEFAULT_FILE)]
     pub config: PathBuf,
 

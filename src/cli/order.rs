@@ -241,8 +241,8 @@ mod tests {
     fn options_may_follow_the_command() {
         let arguments = read("stop --json --url http://drone:8080 --token-file t").expect("right");
         assert_eq!(
-            (arguments.name.as_str(), arguments.json, arguments.url.as_str()),
-            ("camera", true, "http://drone:8080")
+            (arguments.name.as_str(), arguments.json, arguments.url.as_deref()),
+            ("camera", true, Some("http://drone:8080"))
         );
         let arguments = read("--json").expect("right");
         assert!(arguments.order.is_none() && arguments.json);
