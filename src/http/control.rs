@@ -18,12 +18,12 @@ use serde::Serialize;
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::timeout;
 
-use super::gimbals::unknown_gimbal;
+use super::gimbals::{is_unread, not_read, unknown_gimbal};
 use super::routes::{Refusal, Window};
 use super::server::Visit;
 use crate::actions::{Action, Wrong};
 use crate::daemon::window::CoreRequest;
-use crate::gimbals::operation::OperationError;
+use crate::gimbals::operation::{Operation, OperationError};
 use crate::manager::asked::{Answer, Asked, NotDone};
 use crate::manager::control::STANDS_IN_THE_WAY;
 use crate::manager::events::{Names, why};
@@ -129,7 +129,18 @@ pub async fn act(
         Ok(asked) => asked,
         Err(refusal) => return refusal.into_response(),
     };
-    match window.controls.ask(gimbal.clone(), asked).await {
+    let parameter = match &asked {
+        Asked::Operation(Operation::SetParameter { name, .. }) => Some(name.clone()),
+        _ => None,
+    };
+    let answer = window.controls.ask(gimbal.clone(), asked).await;
+    if let (Some(parameter), Some(Err(NotDone::Operation(OperationError::NoAnswer)))) = (&parameter, &answer)
+        // One that it has would have been read, as all the others were.
+        && is_unread(&window.snapshots, &gimbal, parameter).await
+    {
+        return not_read(parameter).into_response();
+    }
+    match answer {
         Some(Ok(())) => Json(Done { gimbal, done: action.command }).into_response(),
         Some(Err(NotDone::UnknownGimbal)) => unknown_gimbal(&window.snapshots, &gimbal).await,
         Some(Err(not_done)) => refused(not_done).into_response(),

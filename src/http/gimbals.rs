@@ -47,10 +47,22 @@ pub async fn parameter(State(window): State<Window>, path: Result<Path<(String, 
     let Ok(Path((name, parameter))) = path else { return malformed() };
     find(&window.snapshots, &name, |gimbal| match gimbal.details.parameters.get(&parameter) {
         Some(value) => Json(json!({"name": parameter, "value": value})).into_response(),
-        None => Refusal::new(StatusCode::NOT_FOUND, format!("no parameter {parameter:?} was read from the gimbal"))
-            .into_response(),
+        None => not_read(&parameter).into_response(),
     })
     .await
+}
+
+/// The answer about a parameter that the gimbal does not have, as far as is known.
+pub fn not_read(parameter: &str) -> Refusal {
+    Refusal::new(StatusCode::NOT_FOUND, format!("no parameter {parameter:?} was read from the gimbal"))
+}
+
+/// Whether a gimbal's parameters are known, and this is none of them.
+pub async fn is_unread(snapshots: &FreshSnapshots, gimbal: &str, parameter: &str) -> bool {
+    let Some(snapshot) = snapshots.within(STATUS_DEADLINE).await else { return false };
+    let gimbal = snapshot.gimbals.iter().find(|known| known.name == gimbal);
+    let parameters = gimbal.map(|gimbal| &gimbal.details.parameters);
+    parameters.is_some_and(|known| !known.is_empty() && !known.contains_key(parameter))
 }
 
 fn part_of(gimbal: &GimbalSnapshot, part: &str) -> Value {

@@ -148,6 +148,19 @@ fn what_is_wrong_with_a_body_is_said() {
     assert_eq!(window.asked.try_recv(), Ok(("camera".to_owned(), off)));
 }
 
+/// What the gimbal does not have it does not answer; that is said once its parameters are known.
+#[test]
+fn a_parameter_that_was_not_read_is_not_there() {
+    let window = with_token(Err(NotDone::Operation(OperationError::NoAnswer)));
+    let answer = window.order("/api/v1/gimbals/camera/parameters/NIX", r#"{"value": 3}"#);
+    let error = json!({"error": "no parameter \"NIX\" was read from the gimbal"});
+    assert_eq!((answer.status, answer.json()), (404, error));
+    for (gimbal, parameter) in [("camera", "RC_TYPE"), ("lamp", "NIX")] {
+        let answer = window.order(&format!("/api/v1/gimbals/{gimbal}/parameters/{parameter}"), r#"{"value": 3}"#);
+        assert_eq!(answer.status, 504, "{gimbal} {parameter}");
+    }
+}
+
 /// "Body bounded; content type checked."
 #[test]
 fn a_body_is_json_of_a_bounded_length_that_comes_in_time() {
