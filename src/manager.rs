@@ -24,6 +24,7 @@ mod mount;
 mod mount_reports;
 mod ownership;
 pub mod roi;
+pub mod rotation;
 mod telling;
 mod vendor_commands;
 
@@ -35,7 +36,7 @@ use crate::geometry::{Angle, Position};
 use crate::gimbals::capabilities::Capabilities;
 use crate::gimbals::operation::{Operation, OperationId};
 use crate::gimbals::report::{GimbalStatus, Identity};
-use crate::gimbals::setpoint::{Setpoint, Turning};
+use crate::gimbals::setpoint::Setpoint;
 use crate::gimbals::settings::GimbalSettings;
 use crate::timestamp::Timestamp;
 use crate::vehicle::Vehicle;
@@ -53,6 +54,7 @@ use mount::MountSenders;
 use mount_reports::MountReports;
 use rank::Ranks;
 use request::{Demand, DemandKind, Refusal, Request};
+use rotation::Rotation;
 use settings::ControlSettings;
 use telling::can_aim;
 use tracking::{RateTimeouts, Situation, Tracking};
@@ -152,8 +154,11 @@ pub struct GimbalManager {
     identity: Identity,
     capabilities: Option<Capabilities>,
     status: Option<(Timestamp, GimbalStatus)>,
-    /// How the device was turning when it was lost.
-    unstopped: Option<Turning>,
+    /// A sign of the device was heard, and it was not lost since.
+    is_heard: bool,
+    rotation: Option<Rotation>,
+    /// When a gimbal that is not known is told again to stop.
+    stop_unknown: Option<Timestamp>,
     /// When its device last told an attitude, also after it was lost.
     told_attitude: Option<Timestamp>,
     control: Control,
@@ -202,7 +207,9 @@ impl GimbalManager {
             identity: Identity::default(),
             capabilities: None,
             status: None,
-            unstopped: None,
+            is_heard: false,
+            rotation: None,
+            stop_unknown: None,
             told_attitude: None,
             control: Control::default(),
             status_schedule: Schedule::new(Interval::Every(DEFAULT_STATUS_INTERVAL)),
@@ -325,6 +332,7 @@ impl GimbalManager {
             self.outputs.push_back(ManagerOutput::Broadcast { channels: Some(due), message });
         }
         self.tell_mount_reports(now, around);
+        self.handle_rotation_timeout(now);
         self.tracking.handle_timeout(now);
         self.carry_out(now, around);
     }
@@ -341,8 +349,9 @@ impl GimbalManager {
         let schedules = schedules.into_iter().flatten().filter(|_| self.device.is_some());
         let lease = self.rules.lease_timeout;
         let tracking = self.tracking.poll_timeout().filter(|_| self.paused_by.is_none());
+        let control = self.control.poll_timeout(lease);
         let rest =
-            [tracking, self.control.poll_timeout(lease), self.source_lost_at(), self.autopilot_client.poll_timeout()];
+            [tracking, control, self.source_lost_at(), self.rotation_due(), self.autopilot_client.poll_timeout()];
         schedules.chain(rest.into_iter().flatten()).min()
     }
 
@@ -396,6 +405,9 @@ impl GimbalManager {
         if !nudges {
             voice.needs_whole()?;
         }
+        if demand.is_stop() && self.stop_unknown(now) {
+            return Ok(());
+        }
         let capabilities = *self.steerable()?;
         let demand = match demand.kind {
             DemandKind::Manual => manual::scale(demand, &capabilities.limits, &self.settings),
@@ -446,6 +458,7 @@ impl GimbalManager {
                 self.outputs.push_back(ManagerOutput::Steer(setpoint));
             }
         }
+        self.note_rotation(now);
         if let Some(who) = self.tracking.take_timed_out() {
             self.tell(Event::RatesEnded { who, end: RatesEnd::TimedOut });
         }

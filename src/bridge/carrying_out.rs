@@ -27,7 +27,7 @@ impl Bridge {
 
     /// Whoever is killed while a gimbal turns finds out at the next start that it is to be stopped.
     fn note_turning(&mut self) {
-        let turning = self.roster.iter().take(64).enumerate().filter(|(_, gimbal)| gimbal.manager.may_be_turning());
+        let turning = self.roster.iter().take(64).enumerate().filter(|(_, gimbal)| gimbal.may_be_turning());
         let turning = turning.fold(0, |set, (at, _)| set | 1 << at);
         if turning == self.turning {
             return;

@@ -93,6 +93,7 @@ impl Bridge {
         match self.roster.adopt(now, source, place, system) {
             Ok(gimbal) => {
                 gimbal.driver.handle_received(now, frame);
+                gimbal.manager.handle_sign(now);
                 if source.system == system {
                     self.conflicts.end_foreign_system(source.component);
                 }

@@ -104,6 +104,11 @@ impl Gimbal {
         self.component == component::ONBOARD_COMPUTER || self.manager.device().is_some()
     }
 
+    /// Whether it may be turning as it was told.
+    pub fn may_be_turning(&self) -> bool {
+        self.manager.may_be_turning() || self.driver.may_be_turning()
+    }
+
     pub fn poll_timeout(&self) -> Option<Timestamp> {
         [self.manager.poll_timeout(), self.driver.poll_timeout()].into_iter().flatten().min()
     }

@@ -219,6 +219,9 @@ impl GimbalManager {
             let demand = Demand { roll: zero, pitch: zero, yaw: zero, ..in_frame(frame.unwrap_or(held)) };
             return self.handle_demand(now, who, &demand, around);
         }
+        if frame.is_none() && self.stop_unknown(now) {
+            return Ok(());
+        }
         let capabilities = *self.steerable()?;
         let situation = self.situation(now, &capabilities, around);
         match frame {
@@ -272,6 +275,7 @@ impl GimbalManager {
             (true, false) => self.tracking.forget(),
             (false, _) => {}
         }
+        self.note_operated(now);
         self.carry_out(now, around);
     }
 

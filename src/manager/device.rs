@@ -4,10 +4,9 @@ use super::events::Event;
 use super::heading::HeadingBias;
 use super::request::Refusal;
 use super::voice::DeviceVoice;
-use super::{DeviceState, GimbalManager, ManagerOutput, Surroundings};
+use super::{DeviceState, GimbalManager, Surroundings};
 use crate::gimbals::capabilities::Capabilities;
 use crate::gimbals::report::{GimbalStatus, Identity, Report};
-use crate::gimbals::setpoint::{Setpoint, Turning};
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 use crate::wire::ids::{CommandResult, FailureFlags};
@@ -24,17 +23,18 @@ impl GimbalManager {
         match report {
             Report::Restarted => {
                 // Its clock may have jumped while it goes on turning.
-                let unstopped = self.tracking.unstopped();
+                let was_turning = self.tracking.unstopped().is_some();
                 self.tracking.forget();
-                if let Some(turning) = unstopped {
-                    self.tracking.halt(now, turning);
+                if was_turning {
+                    self.leave_turning();
+                    self.stop_what_was_left_turning(now);
                 }
                 self.heading_bias = HeadingBias::default();
                 self.tell(Event::Restarted { device: self.device });
             }
             Report::Alive { device } => {
                 if self.device.is_some_and(|before| before != device) {
-                    self.unstopped = None;
+                    self.rotation = None;
                 }
                 if self.device != Some(device) {
                     self.tracking.forget();
@@ -45,7 +45,7 @@ impl GimbalManager {
                     self.told_attitude = None;
                 }
                 let known = self.device.replace(device) == Some(device);
-                self.state = DeviceState::Alive;
+                (self.state, self.is_heard) = (DeviceState::Alive, true);
                 self.tell(if known { Event::Back { device } } else { Event::Found { device } });
                 self.stop_what_was_left_turning(now);
             }
@@ -82,37 +82,18 @@ impl GimbalManager {
                 }
             }
             Report::Lost => {
-                self.state = DeviceState::Lost;
+                (self.state, self.is_heard) = (DeviceState::Lost, false);
                 self.status = None;
                 // It may hear us while we do not hear it; and it is stopped when it is heard again.
-                self.unstopped = self.tracking.unstopped();
-                if let Some(turning) = self.unstopped {
-                    self.outputs.push_back(ManagerOutput::Steer(Setpoint::Turn(turning.stopped())));
+                if self.may_be_turning() {
+                    self.stop_at_once();
+                    self.leave_turning();
                 }
                 self.tracking.forget();
                 self.tell(Event::Lost { device: self.device });
             }
         }
         self.carry_out(now, around);
-    }
-
-    /// An earlier run left the gimbal turning: it is told to stop when it is heard.
-    pub fn stop_when_heard(&mut self) {
-        self.unstopped = Some(Turning::STOPPED);
-    }
-
-    /// Nobody can be told what to do before it is known.
-    fn stop_what_was_left_turning(&mut self, now: Timestamp) {
-        if self.capabilities.is_some()
-            && let Some(turning) = self.unstopped.take()
-        {
-            self.tracking.halt(now, turning);
-        }
-    }
-
-    /// Whether the gimbal was told to turn, and not to stop since.
-    pub fn may_be_turning(&self) -> bool {
-        self.unstopped.is_some() || self.tracking.unstopped().is_some()
     }
 
     /// From now on speaks for the gimbal, or leaves that to the gimbal itself.

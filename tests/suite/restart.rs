@@ -214,9 +214,10 @@ fn a_gimbal_that_was_left_turning_is_stopped_by_the_next_life() {
     let rates: Vec<_> = setpoints.iter().map(|told| [told.angular_velocity_y, told.angular_velocity_z]).collect();
     assert_eq!(rates, [[0.0, 0.0]], "as soon as it is known");
     assert!(setpoints[0].q.iter().all(|q| q.is_nan()), "and to go nowhere");
-    assert_eq!(flight.world.stored_turning, Vec::<String>::new());
+    assert_eq!(flight.world.stored_turning, ["gimbal-154"]);
     let before = flight.pose_deg();
     flight.beat_for(5);
+    assert_eq!(flight.world.stored_turning, Vec::<String>::new());
     assert_same(flight.pose_deg(), before, 0.3);
     assert_eq!(flight.world.snapshot().gimbals[0].primary, None, "nobody holds it");
 }
@@ -231,6 +232,72 @@ fn who_turns_is_kept_from_the_first_rate_to_the_last_zero() {
     assert_eq!(flight.demand(&[NAN, NAN, 0.0, 20.0, 44.0]), Some(ACCEPTED));
     assert_eq!(flight.world.stored_turning, ["gimbal-154"]);
     assert_eq!(flight.demand(&[NAN, NAN, 0.0, 0.0, 44.0]), Some(ACCEPTED));
-    flight.beat_for(1);
+    assert_eq!(flight.world.stored_turning, ["gimbal-154"], "the first zero may be lost");
+    flight.beat_for(2);
     assert_eq!(flight.world.stored_turning, Vec::<String>::new());
+}
+
+/// A stop takes no knowledge: a gimbal that was left turning is told so at the first sign of it, again and again while it
+/// says no more, and once more when it is known.
+#[test]
+fn a_gimbal_that_is_never_known_is_stopped_all_the_same() {
+    let settings = Settings { left_turning: vec!["gimbal-154".to_owned()], ..settings(Some(SYSTEM)) };
+    let (mut world, places) = World::empty(settings);
+    let device = MavId::new(SYSTEM, 154);
+    world.run_for(SECOND);
+    assert_eq!(world.take_messages::<GIMBAL_DEVICE_SET_ATTITUDE_DATA>(places.gimbal), [], "nobody is there");
+    let beats = (SECOND, places.gimbal, device, crate::support::script::gimbal_heartbeat());
+
+    world.send(places.gimbal, device, &crate::support::script::gimbal_heartbeat());
+    world.run_for(Duration::from_millis(20));
+    let told: Vec<GIMBAL_DEVICE_SET_ATTITUDE_DATA> = world.take_messages(places.gimbal);
+    assert_eq!(rates(&told), [[0.0, 0.0]], "at the first sign");
+    world.run_with(5 * SECOND, std::slice::from_ref(&beats));
+    let told: Vec<GIMBAL_DEVICE_SET_ATTITUDE_DATA> = world.take_messages(places.gimbal);
+    assert!(told.len() >= 9 && rates(&told).iter().all(|rates| *rates == [0.0, 0.0]), "{told:?}");
+
+    let known = crate::support::script::device_information(world.now, crate::support::script::usual_capabilities());
+    world.send(places.gimbal, device, &MavMessage::GIMBAL_DEVICE_INFORMATION(known));
+    world.run_with(3 * SECOND, &[beats]);
+    let told: Vec<GIMBAL_DEVICE_SET_ATTITUDE_DATA> = world.take_messages(places.gimbal);
+    assert!(rates(&told).iter().all(|rates| *rates == [0.0, 0.0]), "{told:?}");
+    assert_eq!(world.stored_turning, Vec::<String>::new());
+}
+
+/// Nor is it refused to whoever asks for it, by a command or by the gimbal's name; nothing else is told to a gimbal that is
+/// not known.
+#[test]
+fn a_gimbal_that_is_not_known_can_be_told_to_stop() {
+    let (mut world, places) = World::empty(settings(Some(SYSTEM)));
+    world.run_with(
+        3 * SECOND,
+        &[(SECOND, places.gimbal, MavId::new(SYSTEM, 154), crate::support::script::gimbal_heartbeat())],
+    );
+    world.forget();
+    let ask = |world: &mut World, rate: f32| {
+        let command = command_long(OUR_MANAGER, 1000, &[NAN, NAN, 0.0, rate, 44.0, 0.0, 0.0]);
+        let answers = world.ask(places.ground, GCS, &command);
+        let acks: Vec<gimbald::wire::dialect::COMMAND_ACK_DATA> = of(&answers);
+        world.run_for(Duration::from_millis(20));
+        let told: Vec<GIMBAL_DEVICE_SET_ATTITUDE_DATA> = world.take_messages(places.gimbal);
+        (acks[0].result, rates(&told))
+    };
+    assert_eq!(ask(&mut world, 5.0), (TEMPORARILY_REJECTED, vec![]));
+    assert_eq!(ask(&mut world, 0.0), (ACCEPTED, vec![[0.0, 0.0]]));
+    assert_eq!(ask(&mut world, 5.0), (TEMPORARILY_REJECTED, vec![]));
+
+    let stop = gimbald::bridge::Input::Asked {
+        id: gimbald::gimbals::operation::OperationId(1),
+        gimbal: "gimbal-154",
+        asked: &gimbald::manager::asked::Asked::Stop,
+    };
+    world.input(stop);
+    world.run_for(Duration::from_millis(20));
+    assert_eq!(world.answers.last().map(|(_, answer)| answer.clone()), Some(Ok(())));
+    let told: Vec<GIMBAL_DEVICE_SET_ATTITUDE_DATA> = world.take_messages(places.gimbal);
+    assert_eq!(rates(&told), [[0.0, 0.0]]);
+}
+
+fn rates(setpoints: &[GIMBAL_DEVICE_SET_ATTITUDE_DATA]) -> Vec<[f32; 2]> {
+    setpoints.iter().map(|told| [told.angular_velocity_y, told.angular_velocity_z]).collect()
 }

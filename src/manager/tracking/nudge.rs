@@ -253,6 +253,14 @@ impl Demand {
             && axes.iter().any(|axis| axis.rate.is_some())
             && !self.flags.intersects(more)
     }
+
+    /// Whether it is to turn no more, and nothing else.
+    pub fn is_stop(&self) -> bool {
+        let is_still = |rate: AngularRate| rate.is_zero();
+        self.kind != DemandKind::Manual
+            && self.is_rates_only()
+            && [self.roll, self.pitch, self.yaw].iter().all(|axis| axis.rate.is_none_or(is_still))
+    }
 }
 
 #[cfg(test)]

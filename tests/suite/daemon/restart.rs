@@ -88,7 +88,8 @@ fn kill_and_restart(turning: bool) {
     assert!(took < Duration::from_secs(5), "{took:?}");
     assert_eq!((known.system_id, known.gimbals[0].device.as_deref()), (Some(42), Some("42/154")));
     ground.send(&heartbeat(6, 8));
-    ground.hear_for(Duration::from_millis(500));
+    // One that turned is known to have stopped when it was told for a second.
+    ground.hear_for(Duration::from_millis(if turning { 2_000 } else { 500 }));
     let told = gimbal.take_heard();
     assert!(told.iter().any(|heard| heard.source == MANAGER), "it hears us");
     let rates: Vec<[f32; 2]> = told

@@ -112,6 +112,30 @@ fn it_stops_when_its_operator_is_gone() {
     }
 }
 
+/// An operation in the middle of a rotation takes the place of the demand. The word to stop may be lost: that it may turn is
+/// kept until it has been told for a while.
+#[test]
+fn what_an_operation_interrupts_counts_as_turning_for_a_while() {
+    for generation in [Generation::V1, Generation::V2] {
+        let (mut world, places) = running(generation);
+        take_control(&mut world);
+        let rate = AngularRate::from_degrees_per_second;
+        let (roll, pitch, yaw, yaw_frame) = (None, rate(0.0), rate(10.0), YawFrame::Vehicle);
+        let asks = [
+            Asked::Turn { roll, pitch, yaw, yaw_frame },
+            Asked::Operation(Operation::SetYawMode(gimbald::gimbals::operation::YawMode::Follow)),
+        ];
+        for (id, asked) in (1..).zip(&asks) {
+            world.input(Input::Asked { id: OperationId(id), gimbal: "camera", asked });
+            run(&mut world, places, SECOND / 2);
+            assert_eq!(world.stored_turning, ["camera"], "{generation:?} {asked:?}");
+        }
+        run(&mut world, places, 8 * SECOND);
+        assert!(world.answers.contains(&(OperationId(2), Ok(()))), "{:?}", world.answers);
+        assert_eq!(world.stored_turning, Vec::<String>::new(), "{generation:?}");
+    }
+}
+
 /// "31011 p7=2 (FOLLOW, once, ACKed) then 205 p6=1" (gimbals 2.5), and no more than it takes.
 #[test]
 fn v1_the_mode_is_said_once_and_the_angle_as_often_as_it_takes() {

@@ -1,0 +1,120 @@
+//! Whether the gimbal may be turning as it was told, and the word that stops it when there is nobody to decide more.
+//!
+//! A word may be lost. So what was told to turn counts as turning until it was told otherwise for a while, and what an
+//! earlier run, a loss or another dialect left turning is told to stop before anything is known of it: that takes no
+//! knowledge.
+
+use std::time::Duration;
+
+use super::{DeviceState, GimbalManager, ManagerOutput};
+use crate::gimbals::setpoint::{Setpoint, Turning};
+use crate::timestamp::Timestamp;
+
+/// What was told something else than its rotation for so long has heard it.
+pub const STOPPED_AFTER: Duration = Duration::from_secs(1);
+
+/// A gimbal that was left turning is told so often to stop while it is not known.
+pub const STOP_UNKNOWN_EVERY: Duration = Duration::from_millis(500);
+
+/// What the gimbal was told to turn at.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Rotation {
+    turning: Turning,
+    /// Since when it is told something else.
+    stopped: Option<Timestamp>,
+    /// Nobody has told it anything since it was left to itself.
+    is_left: bool,
+}
+
+impl GimbalManager {
+    /// Whether the gimbal may be turning as it was told.
+    pub fn may_be_turning(&self) -> bool {
+        self.rotation.is_some()
+    }
+
+    /// An earlier run left the gimbal turning: it is told to stop when it is heard.
+    pub fn stop_when_heard(&mut self) {
+        self.rotation = Some(Rotation { turning: Turning::STOPPED, stopped: None, is_left: true });
+    }
+
+    /// The first sign of its device: more may never come.
+    pub fn handle_sign(&mut self, now: Timestamp) {
+        self.is_heard = true;
+        self.stop_what_was_left_turning(now);
+    }
+
+    /// Tells the gimbal to stop turning, whatever is known of it.
+    pub fn stop_at_once(&mut self) {
+        let turning = self.rotation.map_or(Turning::STOPPED, |rotation| rotation.turning);
+        self.outputs.push_back(ManagerOutput::Steer(Setpoint::Turn(turning.stopped())));
+    }
+
+    /// Nobody can be told what to do before it is known, but to stop.
+    pub(super) fn stop_what_was_left_turning(&mut self, now: Timestamp) {
+        let Some(rotation) = self.rotation.as_mut().filter(|rotation| rotation.is_left) else { return };
+        if self.capabilities.is_some() {
+            rotation.is_left = false;
+            let turning = rotation.turning;
+            self.tracking.halt(now, turning);
+        } else if self.is_heard {
+            self.stop_unknown = Some(now + STOP_UNKNOWN_EVERY);
+            self.stop_at_once();
+        }
+    }
+
+    /// Somebody who may wants a gimbal to stop that is not known yet; true where it can be told.
+    pub(super) fn stop_unknown(&mut self, now: Timestamp) -> bool {
+        let can_hear = self.is_heard && self.state != DeviceState::Lost && self.capabilities.is_none();
+        if can_hear {
+            if !self.may_be_turning() {
+                self.stop_when_heard();
+            }
+            self.stop_what_was_left_turning(now);
+        }
+        can_hear
+    }
+
+    /// It may go on turning as it was told, and is not told anything for the time being.
+    pub(super) fn leave_turning(&mut self) {
+        if let Some(rotation) = &mut self.rotation {
+            (rotation.stopped, rotation.is_left) = (None, true);
+        }
+    }
+
+    /// After each event: what the gimbal was told last.
+    pub(super) fn note_rotation(&mut self, now: Timestamp) {
+        match (self.tracking.unstopped(), &mut self.rotation) {
+            (Some(turning), rotation) => *rotation = Some(Rotation { turning, stopped: None, is_left: false }),
+            (None, Some(rotation)) if !rotation.is_left => {
+                rotation.stopped.get_or_insert(now);
+            }
+            (None, _) => {}
+        }
+    }
+
+    /// An operation has taken the place of what the gimbal was told: a single word to stop went before it, and whatever
+    /// is to follow that is the driver's.
+    pub(super) fn note_operated(&mut self, now: Timestamp) {
+        if let Some(stopped) = self.rotation.as_mut().and_then(|rotation| rotation.stopped.as_mut()) {
+            *stopped = now;
+        }
+    }
+
+    pub(super) fn handle_rotation_timeout(&mut self, now: Timestamp) {
+        if self.rotation_due().is_none_or(|due| due > now) {
+            return;
+        }
+        match self.rotation {
+            Some(Rotation { is_left: true, .. }) => self.stop_what_was_left_turning(now),
+            _ => self.rotation = None,
+        }
+    }
+
+    pub(super) fn rotation_due(&self) -> Option<Timestamp> {
+        let rotation = self.rotation?;
+        if rotation.is_left {
+            return self.stop_unknown.filter(|_| self.is_heard && self.capabilities.is_none());
+        }
+        rotation.stopped.filter(|_| self.paused_by.is_none()).map(|at| at + STOPPED_AFTER)
+    }
+}
