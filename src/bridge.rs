@@ -12,6 +12,7 @@ mod channels;
 mod conflicts;
 mod delivery;
 mod devices;
+mod ending;
 mod events;
 mod firewall;
 mod gimbal_streams;
@@ -50,6 +51,7 @@ use announcements::Announcements;
 use asked::UnderWay;
 use channels::Channels;
 use conflicts::Conflicts;
+use ending::Stopping;
 use events::Events;
 use gimbal_streams::GimbalStreams;
 use identity::Identity;
@@ -154,6 +156,7 @@ pub struct Bridge {
     buffer: FrameBuffer,
     timers: TimerTable<Timer>,
     shutting_down: bool,
+    stopping: Option<Stopping>,
     /// By place in the roster, which gimbals may be turning as they were told; kept outside when it changes.
     turning: u64,
 }
@@ -202,6 +205,7 @@ impl Bridge {
             buffer: FrameBuffer::default(),
             timers: TimerTable::default(),
             shutting_down: false,
+            stopping: None,
             turning: 0,
             identity,
             settings,
@@ -247,7 +251,7 @@ impl Bridge {
     /// Does what is due at `now`; drain [`poll_output`](Self::poll_output) afterwards.
     pub fn handle_timeout(&mut self, now: Timestamp) {
         if self.shutting_down {
-            self.channels.pump_all(now, &mut self.outbox);
+            self.handle_ending(now);
             return;
         }
         self.settle_identity(now);
@@ -286,7 +290,7 @@ impl Bridge {
     /// When [`handle_timeout`](Self::handle_timeout) is due.
     pub fn poll_timeout(&self) -> Option<Timestamp> {
         if self.shutting_down {
-            return self.channels.poll_output_timeout();
+            return self.ending_due();
         }
         let timers = [
             self.timers.next().map(|(at, _)| at),
@@ -302,11 +306,6 @@ impl Bridge {
         let gimbals = self.roster.iter().filter_map(|gimbal| gimbal.poll_timeout());
         let gimbals = gimbals.filter(|_| self.identity.system().is_some());
         timers.into_iter().flatten().chain(gimbals).min()
-    }
-
-    /// Whether everything due before the end has been given out.
-    pub fn is_finished(&self) -> bool {
-        self.shutting_down && self.channels.is_drained()
     }
 
     fn open_channel(&mut self, now: Timestamp, channel: ChannelId, link: LinkIndex, address: &str) {
@@ -339,29 +338,6 @@ impl Bridge {
         for gimbal in self.roster.iter_mut() {
             gimbal.manager.handle_vehicle(now, around);
         }
-    }
-
-    fn shut_down(&mut self, now: Timestamp) {
-        let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
-        for gimbal in self.roster.iter_mut() {
-            gimbal.manager.handle_shutdown(now, around);
-        }
-        self.carry_out(now);
-        // The goodbye is the last word.
-        self.channels.keep_control();
-        self.channels.lift_limits();
-        if self.identity.system().is_some() {
-            for at in 0..self.roster.len() {
-                let gimbal = self.roster.get_mut(at);
-                if gimbal.beats() {
-                    let (component, goodbye) = (gimbal.component, heartbeat::goodbye(gimbal));
-                    self.send(now, self.channels.open_set(), component, &goodbye);
-                }
-            }
-            self.say_goodbye_as_presented(now);
-        }
-        self.asked.end_all(&mut self.outbox);
-        self.shutting_down = true;
     }
 
     fn is_own_id(&self, id: MavId) -> bool {

@@ -112,6 +112,37 @@ fn it_stops_when_its_operator_is_gone() {
     }
 }
 
+/// At the end the zero is repeated as long as the process has time, in either generation, also to one that acknowledges
+/// nothing; and that it may turn is kept for the next start.
+#[test]
+fn at_the_end_it_is_told_to_stop_again_and_again() {
+    for generation in [Generation::V1, Generation::V2] {
+        let (mut world, places) = running(generation);
+        demand(&mut world, places, [NAN, NAN, 0.0, 10.0, 0.0]);
+        run(&mut world, places, SECOND);
+        world.remove(places.gimbal);
+        world.forget();
+
+        world.input(Input::Shutdown);
+        world.run_for(SECOND / 2);
+
+        assert!(world.bridge.is_finished());
+        let (commands, setpoints) = orders(&mut world, places);
+        assert_eq!(world.stored_turning, ["camera"], "{generation:?}");
+        let zeros = match generation {
+            Generation::V1 => {
+                assert!(commands.iter().all(|told| *told == packet::turn_at(GIMBAL, [AngularRate::ZERO; 3])));
+                commands.len()
+            }
+            Generation::V2 => {
+                assert!(setpoints.iter().all(|told| (told.angular_velocity_y, told.angular_velocity_z) == (0.0, 0.0)));
+                setpoints.len()
+            }
+        };
+        assert!((5..=12).contains(&zeros), "{generation:?}: {zeros}");
+    }
+}
+
 /// An operation in the middle of a rotation takes the place of the demand. The word to stop may be lost: that it may turn is
 /// kept until it has been told for a while.
 #[test]

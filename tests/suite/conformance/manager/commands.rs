@@ -302,7 +302,8 @@ fn item_136_a_command_int_carries_flags_and_id_as_they_are() {
     assert_eq!(world.result_of(places.ground, GCS, &command(-1, 154.0)), Some(DENIED));
 }
 
-/// "When stopped by SIGTERM during a rate set-point, a zero-rate 284 is sent before exit, then one POWEROFF heartbeat."
+/// "When stopped by SIGTERM during a rate set-point, a zero-rate 284 is sent before exit, then one POWEROFF heartbeat." The
+/// zero is sent again and again meanwhile, because each may be lost; where nothing turns there is nothing to wait for.
 #[test]
 fn item_179_at_the_end_the_gimbal_is_stopped_and_goodbye_said() {
     let (mut world, places) = with_gimbal();
@@ -310,13 +311,20 @@ fn item_179_at_the_end_the_gimbal_is_stopped_and_goodbye_said() {
     run_looking(&mut world, places, SECOND, 0.0, 0.0);
     world.forget();
 
+    let ended = world.now;
     world.input(Input::Shutdown);
+    assert!(!world.bridge.is_finished());
+    world.run_for(SECOND / 2);
 
     let heard = world.take(places.gimbal);
     let told: Vec<u32> = ids(&heard).into_iter().filter(|id| *id != 281).collect();
-    assert_eq!(told, [284, 0]);
-    let stopped: Setpoint = heard.iter().find(|arrival| arrival.id() == 284).expect("it was told").decode();
-    assert_eq!((stopped.angular_velocity_y, stopped.angular_velocity_z), (0.0, 0.0));
+    assert_eq!(told, [284, 284, 284, 284, 284, 284, 0]);
+    for (zero, after_ms) in heard.iter().filter(|arrival| arrival.id() == 284).zip([0, 80, 160, 240, 320, 400]) {
+        let stopped: Setpoint = zero.decode();
+        assert_eq!((stopped.angular_velocity_y, stopped.angular_velocity_z), (0.0, 0.0));
+        assert_eq!((zero.at - ended).as_millis(), after_ms);
+    }
+    assert_eq!(world.stored_turning, ["gimbal-154"], "whether it has heard one is not known");
     for place in [places.autopilot, places.ground] {
         let beats: Vec<HEARTBEAT_DATA> = of(&world.take(place));
         assert_eq!(beats.iter().map(|beat| beat.system_status).collect::<Vec<_>>(), [7]);
@@ -325,6 +333,12 @@ fn item_179_at_the_end_the_gimbal_is_stopped_and_goodbye_said() {
     world.run_for(SECOND / 2);
     let beats: Vec<HEARTBEAT_DATA> = world.take_messages(places.ground);
     assert_eq!(beats, [], "one goodbye");
+
+    let (mut world, places) = with_gimbal();
+    world.input(Input::Shutdown);
+    assert!(world.bridge.is_finished());
+    let beats: Vec<HEARTBEAT_DATA> = world.take_messages(places.ground);
+    assert_eq!(beats.last().map(|beat| beat.system_status), Some(7));
 }
 
 /// "When a value is NaN internally, HTTP JSON has null in its place and is parseable by a strict parser." What the
