@@ -3,7 +3,9 @@
 //! Every gimbal is taken for a v2 device at first, and asked who it is for ever, as the Gimbal Protocol v2 has it. One that
 //! says it is a Gremsy's is driven as one. One that gives no sign of being a v2 device is asked for parameters that only a
 //! Gremsy has, and otherwise taken for a v1 gimbal: soon when it tells where it looks by a message of v1, late when it sends
-//! nothing but heartbeats. Nothing of this moves it. Whenever a sign of v2 comes after all, it is a v2 device again.
+//! nothing but heartbeats. Nothing of this moves it. Whenever a sign of v2 comes after all, it is a v2 device again, and one
+//! that is taken for a v1 gimbal is asked on for what only a Gremsy has. What a v2 device says of itself outweighs the name
+//! of a parameter, which anybody may use.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -16,7 +18,7 @@ use super::gremsy::parameters::ParameterTable;
 use super::mavlink_v2::{MavlinkV2Driver, packet};
 use super::operation::{Operation, OperationId};
 use super::report::Report;
-use super::setpoint::Setpoint;
+use super::setpoint::{Setpoint, Turning};
 use super::settings::{Family, GimbalSettings};
 use crate::timers::TimerTable;
 use crate::timestamp::Timestamp;
@@ -36,6 +38,8 @@ const ASK_PARAMETERS_AFTER: Duration = Duration::from_secs(2);
 const PARAMETER_QUESTIONS: u8 = 3;
 /// … at this interval.
 const ASK_PARAMETERS_EVERY: Duration = Duration::from_secs(1);
+/// One that is taken for a v1 gimbal is asked again so often: the answers may all have been lost.
+const ASK_PARAMETERS_AGAIN_EVERY: Duration = Duration::from_secs(10);
 
 /// Stands in front of the driver of whatever family it turns out to be.
 #[derive(Debug)]
@@ -49,6 +53,8 @@ pub struct Detection {
     evidence: Evidence,
     /// That it is there was reported, and that it is lost was not.
     is_reported: bool,
+    /// How it was last told to turn, while it is not told anything else.
+    turning: Option<Turning>,
     timers: TimerTable<Timer>,
     outputs: VecDeque<DriverOutput>,
 }
@@ -81,6 +87,7 @@ impl Detection {
             other: None,
             evidence: Evidence::default(),
             is_reported: false,
+            turning: None,
             timers: TimerTable::default(),
             outputs: VecDeque::new(),
         }
@@ -98,6 +105,7 @@ impl Detection {
         let Some(device) = self.device.filter(|_| self.family() != family) else { return };
         tracing::info!(%device, family = family.name(), "the gimbal's family is known");
         self.stop_judging();
+        self.take_leave(now);
         // A Gremsy may be either, and says which.
         if family != Family::Gremsy {
             self.outputs.push_back(DriverOutput::Report(Report::SpeaksForItself(family == Family::MavlinkV2)));
@@ -112,12 +120,30 @@ impl Detection {
             other.adopt(now, device);
             self.other = Some(other);
         }
+        if family == Family::MavlinkV1 {
+            self.timers.set(Timer::AskParameters, now + ASK_PARAMETERS_AGAIN_EVERY);
+        }
+    }
+
+    /// The driver in use ends a rotation in its own words: in those of another the gimbal may not understand it.
+    fn take_leave(&mut self, now: Timestamp) {
+        if let Some(turning) = self.turning.take() {
+            self.in_use().handle_setpoint(now, Setpoint::Turn(turning.stopped()));
+            self.collect();
+        }
+        if self.is_reported {
+            self.outputs.push_back(DriverOutput::Report(Report::AnotherFamily));
+        }
     }
 
     /// Notes what a frame of the device says of its family.
     fn weigh(&mut self, now: Timestamp, frame: &Frame<'_>) {
-        // One of these speaks both v1 and v2.
+        // One of these speaks both v1 and v2, and says by 283 that it is one.
         if self.family() == Family::Gremsy {
+            if frame.message_id() == message::GIMBAL_DEVICE_INFORMATION && is_of_another(frame) {
+                self.evidence.v2 = true;
+                self.take(now, Family::MavlinkV2);
+            }
             return;
         }
         match frame.message_id() {
@@ -127,7 +153,12 @@ impl Detection {
                 self.timers.set(Timer::JudgeByAttitude, now + V1_BY_ITS_ATTITUDE_AFTER);
                 self.timers.set(Timer::JudgeBySilence, now + V1_BY_ITS_SILENCE_AFTER);
             }
-            message::PARAM_VALUE if is_parameter_of_gremsy(frame) => self.take(now, Family::Gremsy),
+            message::HEARTBEAT if self.family() == Family::MavlinkV1 => {
+                self.timers.set_no_later(Timer::AskParameters, now + ASK_PARAMETERS_AGAIN_EVERY);
+            }
+            message::PARAM_VALUE if !self.evidence.v2 && is_parameter_of_gremsy(frame) => {
+                self.take(now, Family::Gremsy)
+            }
             message::GIMBAL_DEVICE_INFORMATION if is_of_gremsy(frame) => self.take(now, Family::Gremsy),
             message::GIMBAL_DEVICE_INFORMATION | message::GIMBAL_DEVICE_ATTITUDE_STATUS
                 if (!self.evidence.v2 || self.other.is_some()) && is_of_v2(frame) =>
@@ -158,8 +189,10 @@ impl Detection {
             });
             self.outputs.push_back(DriverOutput::Message(Box::new(question)));
         }
-        self.evidence.questions += 1;
-        if self.evidence.questions < PARAMETER_QUESTIONS {
+        self.evidence.questions = self.evidence.questions.saturating_add(1);
+        if self.family() == Family::MavlinkV1 {
+            self.timers.set(Timer::AskParameters, now + ASK_PARAMETERS_AGAIN_EVERY);
+        } else if self.evidence.questions < PARAMETER_QUESTIONS {
             self.timers.set(Timer::AskParameters, now + ASK_PARAMETERS_EVERY);
         }
     }
@@ -227,6 +260,10 @@ impl GimbalDriver for Detection {
     }
 
     fn handle_setpoint(&mut self, now: Timestamp, setpoint: Setpoint) {
+        self.turning = match setpoint {
+            Setpoint::Turn(turning) if !turning.is_zero() => Some(turning),
+            _ => None,
+        };
         self.in_use().handle_setpoint(now, setpoint);
         self.collect();
     }
@@ -259,6 +296,10 @@ impl GimbalDriver for Detection {
         self.collect();
     }
 
+    fn may_be_turning(&self) -> bool {
+        self.other.as_ref().map_or_else(|| self.v2.may_be_turning(), |other| other.may_be_turning())
+    }
+
     fn poll_output(&mut self) -> Option<DriverOutput> {
         self.outputs.pop_front()
     }
@@ -279,6 +320,13 @@ impl GimbalDriver for Detection {
 fn is_of_gremsy(frame: &Frame<'_>) -> bool {
     let information = packet::read_information(frame).filter(|information| information.gimbal_device_id == 0);
     information.is_some_and(|information| gremsy::is_vendor(&information.identity.vendor))
+}
+
+/// Whether a v2 device says that somebody else made it.
+fn is_of_another(frame: &Frame<'_>) -> bool {
+    let information = packet::read_information(frame).filter(|information| information.gimbal_device_id == 0);
+    let vendor = information.map(|information| information.identity.vendor).filter(|vendor| !vendor.is_empty());
+    vendor.is_some_and(|vendor| !gremsy::is_vendor(&vendor))
 }
 
 /// Whether only a Gremsy has the parameter.

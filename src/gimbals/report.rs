@@ -14,6 +14,9 @@ pub enum Report {
     },
     /// It was restarted, and does not do any more what it was told before.
     Restarted,
+    /// It speaks otherwise than it was taken to: what was known of it does not hold, and what it was told it may not have
+    /// understood.
+    AnotherFamily,
     /// Whether it is a v2 device, which tells clients itself what it is and where it looks. One that is none is spoken
     /// for by its manager.
     SpeaksForItself(bool),

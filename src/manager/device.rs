@@ -17,7 +17,7 @@ impl GimbalManager {
         if !matches!(report, Report::Attitude(_) | Report::Malformed { .. } | Report::Fault(_)) {
             self.last_command = None;
         }
-        if matches!(report, Report::Restarted | Report::Lost) {
+        if matches!(report, Report::Restarted | Report::AnotherFamily | Report::Lost) {
             self.paused_by = None;
         }
         match report {
@@ -47,6 +47,14 @@ impl GimbalManager {
                 let known = self.device.replace(device) == Some(device);
                 (self.state, self.is_heard) = (DeviceState::Alive, true);
                 self.tell(if known { Event::Back { device } } else { Event::Found { device } });
+                self.stop_what_was_left_turning(now);
+            }
+            Report::AnotherFamily => {
+                self.tracking.forget();
+                self.heading_bias = HeadingBias::default();
+                self.capabilities = None;
+                self.status = None;
+                self.leave_turning();
                 self.stop_what_was_left_turning(now);
             }
             Report::SpeaksForItself(itself) => self.speak_for_device(now, !itself),

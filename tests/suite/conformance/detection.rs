@@ -13,11 +13,13 @@ use gimbald::timestamp::Timestamp;
 use gimbald::wire::MavId;
 use gimbald::wire::dialect::{
     COMMAND_LONG_DATA, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA,
-    GIMBAL_MANAGER_INFORMATION_DATA, MavMessage,
+    GIMBAL_DEVICE_SET_ATTITUDE_DATA, GIMBAL_MANAGER_INFORMATION_DATA, MavMessage, PARAM_REQUEST_READ_DATA,
+    PARAM_VALUE_DATA,
 };
 
 use crate::support::script::{
-    NAN, command_long, device_information, gimbal_heartbeat, ground_heartbeat, of, pitch_yaw_deg, usual_capabilities,
+    ACCEPTED, NAN, TEMPORARILY_REJECTED, command_long, device_information, gimbal_heartbeat, ground_heartbeat, of,
+    pitch_yaw_deg, usual_capabilities,
 };
 use crate::support::world::{Arrival, GCS, GIMBAL, Places, World, three_links};
 
@@ -178,4 +180,88 @@ fn a_gremsy_of_the_second_generation_is_known_by_its_name() {
     assert_eq!((gimbal.state.as_str(), gimbal.device_id), ("alive", Some(154)));
     let heard = from_manager(world.take(places.ground));
     assert!(of::<GIMBAL_DEVICE_ATTITUDE_STATUS_DATA>(&heard).is_empty(), "it speaks for itself");
+}
+
+/// A parameter may have any name: one of a v2 device that somebody else made is none of a Gremsy, and the device is driven
+/// on as it was.
+#[test]
+fn a_parameters_name_does_not_make_a_gremsy_of_a_v2_device() {
+    let (mut world, places) = World::with_one_gimbal(three_links());
+    for name in ["PITCH_P", "STIFF_TILT"] {
+        world.send(places.gimbal, GIMBAL, &parameter(name));
+        assert_eq!(family(&world), "mavlink_v2", "{name}");
+    }
+    assert_eq!(turn(&mut world, places, 10.0), Some(ACCEPTED));
+}
+
+/// All its answers may have been lost while it was judged: one that is taken for a v1 gimbal is asked on for what only a
+/// Gremsy has.
+#[test]
+fn what_is_taken_for_a_v1_gimbal_is_a_gremsy_when_its_parameters_come() {
+    let (mut world, places) = with_v1_gimbal(Feedback::Orientation);
+    run(&mut world, places, 30 * SECOND);
+    assert_eq!(family(&world), "mavlink_v1");
+    world.forget();
+    run(&mut world, places, 30 * SECOND);
+    let asked: Vec<PARAM_REQUEST_READ_DATA> = world.take_messages(places.gimbal);
+    let names: Vec<&str> = asked.iter().map(|asked| asked.param_id.to_str().expect("a name")).collect();
+    assert_eq!(names, ["STIFF_TILT", "PITCH_P"].repeat(3));
+
+    world.send(places.gimbal, GIMBAL, &parameter("PITCH_P"));
+
+    assert_eq!(family(&world), "gremsy");
+}
+
+/// A gimbal that turns when it turns out to speak otherwise is stopped in the words that it was turned with, and nobody is
+/// told that it does what it is not known to understand.
+#[test]
+fn a_change_of_family_stops_what_turns_first() {
+    let (mut world, places) = World::empty(three_links());
+    world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
+    let beat = (SECOND, places.gimbal, GIMBAL, gimbal_heartbeat());
+    world.run_with(2 * SECOND, std::slice::from_ref(&beat));
+    let information = device_information(world.now, usual_capabilities());
+    world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_INFORMATION(information.clone()));
+    assert_eq!(turn(&mut world, places, 10.0), Some(ACCEPTED));
+    world.forget();
+
+    let gremsy = GIMBAL_DEVICE_INFORMATION_DATA { vendor_name: "Gremsy".into(), ..information };
+    world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_INFORMATION(gremsy));
+
+    assert_eq!(family(&world), "gremsy");
+    let told: Vec<GIMBAL_DEVICE_SET_ATTITUDE_DATA> = world.take_messages(places.gimbal);
+    let rates: Vec<_> = told.iter().map(|told| [told.angular_velocity_y, told.angular_velocity_z]).collect();
+    assert_eq!(rates, [[0.0, 0.0]]);
+    assert_eq!(turn(&mut world, places, 10.0), Some(TEMPORARILY_REJECTED));
+    assert_eq!(world.stored_turning, ["gimbal-154"], "until it is known to have stopped");
+}
+
+/// One that was taken for a Gremsy by a parameter, and says that somebody else made it, is none.
+#[test]
+fn who_made_it_outweighs_a_parameter() {
+    let (mut world, places) = World::empty(three_links());
+    world.run_with(2 * SECOND, &[(SECOND, places.gimbal, GIMBAL, gimbal_heartbeat())]);
+    world.send(places.gimbal, GIMBAL, &parameter("PITCH_P"));
+    assert_eq!(family(&world), "gremsy");
+    let information = MavMessage::GIMBAL_DEVICE_INFORMATION(device_information(world.now, usual_capabilities()));
+    world.send(places.gimbal, GIMBAL, &information);
+    assert_eq!((family(&world).as_str(), world.snapshot().gimbals[0].state.as_str()), ("mavlink_v2", "alive"));
+    world.send(places.gimbal, GIMBAL, &parameter("PITCH_P"));
+    assert_eq!(family(&world), "mavlink_v2");
+}
+
+fn parameter(name: &str) -> MavMessage {
+    MavMessage::PARAM_VALUE(PARAM_VALUE_DATA {
+        param_value: 20.0,
+        param_count: 10,
+        param_index: 0,
+        param_id: name.into(),
+        param_type: 6,
+    })
+}
+
+/// A rotation in degrees per second from the nose, asked for by the ground station.
+fn turn(world: &mut World, places: Places, rate: f32) -> Option<u8> {
+    let command = command_long(MANAGER, 1000, &[NAN, NAN, 0.0, rate, 44.0, 0.0, 0.0]);
+    world.result_of(places.ground, GCS, &command)
 }
