@@ -15,7 +15,42 @@ pub mod version;
 
 pub use driver::GremsyDriver;
 
+use self::parameters::ParameterTable;
+use crate::gimbals::mavlink_v2::packet::read_information;
+use crate::gimbals::settings::Family;
+use crate::wire::dialect::{CharArray, MavMessage, PARAM_REQUEST_READ_DATA, PARAM_VALUE_DATA};
+use crate::wire::{Frame, MavId};
+
 /// Whether `GIMBAL_DEVICE_INFORMATION` with that vendor is a Gremsy's.
 pub fn is_vendor(vendor: &str) -> bool {
     vendor.trim().eq_ignore_ascii_case("gremsy")
+}
+
+/// Whether by that frame a gimbal says that it is a Gremsy: by its maker's name, or by a parameter that only a Gremsy has.
+pub fn is_known_by(frame: &Frame<'_>) -> bool {
+    let information = read_information(frame).filter(|information| information.gimbal_device_id == 0);
+    let value = frame.decode::<PARAM_VALUE_DATA>();
+    let name = value.as_ref().and_then(|value| value.param_id.to_str().ok());
+    information.is_some_and(|information| is_vendor(&information.identity.vendor))
+        || ParameterTable::recognised_by(name).is_some()
+}
+
+/// Asks a gimbal for parameters that only a Gremsy has.
+pub fn telling_questions(device: MavId) -> impl Iterator<Item = MavMessage> {
+    ParameterTable::TELLING_NAMES.into_iter().map(move |name| {
+        MavMessage::PARAM_REQUEST_READ(PARAM_REQUEST_READ_DATA {
+            param_index: -1,
+            target_system: device.system,
+            target_component: device.component,
+            param_id: CharArray::from(name),
+        })
+    })
+}
+
+/// What is wrong with a Gremsy that is driven as one of `family`.
+pub fn wrong_family(family: Family) -> String {
+    format!(
+        "this gimbal says that it is a Gremsy, but its family is {}. Set family = \"gremsy\", or leave the key out",
+        family.name()
+    )
 }

@@ -28,6 +28,7 @@ use super::status::{SystemStatus, read_system_status};
 use crate::gimbals::capabilities::Capabilities;
 use crate::gimbals::details::GimbalDetails;
 use crate::gimbals::driver::{CommandOutcome, DriverOutput, GimbalDriver};
+use crate::gimbals::gremsy::is_vendor;
 use crate::gimbals::gremsy::parameters::{Axis, Parameter, ParameterTable};
 use crate::gimbals::mavlink_v2::MavlinkV2Driver;
 use crate::gimbals::mavlink_v2::packet::{DeviceInformation, read_information};
@@ -176,6 +177,15 @@ impl GremsyDriver {
         }
     }
 
+    /// Whether the configuration calls another maker's gimbal a Gremsy.
+    fn look_at_maker(&mut self) {
+        self.faults.clear(|fault| matches!(fault, Fault::OtherMaker(_)));
+        let vendor = self.information.as_ref().map(|information| information.identity.vendor.trim().to_owned());
+        if let Some(vendor) = vendor.filter(|vendor| !vendor.is_empty() && !is_vendor(vendor)) {
+            self.raise(Fault::OtherMaker(vendor));
+        }
+    }
+
     fn raise(&mut self, fault: Fault) {
         if let Some(short) = self.faults.raise(fault) {
             self.warn(short);
@@ -271,6 +281,7 @@ impl GimbalDriver for GremsyDriver {
             message::GIMBAL_DEVICE_INFORMATION => {
                 self.heard.information = Some(now);
                 self.information = read_information(frame).or(self.information.take());
+                self.look_at_maker();
                 self.timers.cancel(Timer::AskInformation);
                 self.look_at_settings();
             }

@@ -14,6 +14,7 @@ use crate::geometry::{Angle, AngularRate, Attitude, AxisLimits, GimbalAngles, Li
 use crate::gimbals::capabilities::Capabilities;
 use crate::gimbals::details::GimbalDetails;
 use crate::gimbals::driver::{CommandOutcome, DriverOutput, GimbalDriver};
+use crate::gimbals::gremsy;
 use crate::gimbals::operation::{Operation, OperationError, OperationId};
 use crate::gimbals::report::{GimbalAttitude, GimbalStatus, Identity, Report};
 use crate::gimbals::setpoint::{Pointing, RadioControl, Setpoint};
@@ -41,6 +42,9 @@ const FEEDBACK_MISSING_AFTER: Duration = Duration::from_secs(2);
 const OPEN_LOOP_INTERVAL: Duration = Duration::from_millis(100);
 /// How fast such a gimbal is taken to be.
 const OPEN_LOOP_RATE: AngularRate = AngularRate::from_degrees_per_second(30.0);
+
+/// A gimbal that sends `SYS_STATUS`, as no plain v1 gimbal is known to, is asked so often whether it is a Gremsy.
+const GREMSY_QUESTIONS: u8 = 3;
 
 /// What is assumed of a v1 gimbal, which cannot say: three axes held to the horizon, yaw against the vehicle.
 fn capabilities(settings: &V1Settings) -> Capabilities {
@@ -81,6 +85,9 @@ pub struct MavlinkV1Driver {
     feedback: Feedback,
     /// Its clock, where it tells it.
     boot_ms: Option<u32>,
+    /// It said that it is one, which has a family of its own.
+    says_gremsy: bool,
+    gremsy_questions_left: u8,
     /// Where it is taken to look while it does not say so.
     assumed: GimbalAngles,
     assumed_at: Timestamp,
@@ -133,6 +140,8 @@ impl MavlinkV1Driver {
             configuration: Configuration::Unknown,
             feedback: Feedback::Awaited,
             boot_ms: None,
+            says_gremsy: false,
+            gremsy_questions_left: GREMSY_QUESTIONS,
             assumed: GimbalAngles::default(),
             assumed_at: Timestamp::ZERO,
             timers: TimerTable::default(),
@@ -300,6 +309,9 @@ impl MavlinkV1Driver {
         self.alive = false;
         self.ready = false;
         self.boot_ms = None;
+        // Another may come in its place.
+        self.says_gremsy = false;
+        self.gremsy_questions_left = GREMSY_QUESTIONS;
         // What it is told next is told anew, and not before it is asked for again.
         self.wanted = None;
         self.sent = None;
@@ -324,6 +336,14 @@ impl GimbalDriver for MavlinkV1Driver {
     fn handle_received(&mut self, now: Timestamp, frame: &Frame<'_>) {
         let Some(device) = self.device.filter(|device| *device == frame.source()) else { return };
         match frame.message_id() {
+            message::SYS_STATUS if self.alive && !self.says_gremsy && self.gremsy_questions_left > 0 => {
+                self.gremsy_questions_left -= 1;
+                let questions = gremsy::telling_questions(device);
+                self.outputs.extend(questions.map(|question| DriverOutput::Message(Box::new(question))));
+            }
+            message::PARAM_VALUE | message::GIMBAL_DEVICE_INFORMATION => {
+                self.says_gremsy |= gremsy::is_known_by(frame);
+            }
             message::HEARTBEAT => {
                 let Some(heartbeat) = frame.decode::<HEARTBEAT_DATA>() else { return };
                 self.handle_heard(now, device);
@@ -411,7 +431,8 @@ impl GimbalDriver for MavlinkV1Driver {
     }
 
     fn details(&self, _now: Timestamp) -> GimbalDetails {
-        GimbalDetails::default()
+        let faults = if self.says_gremsy { vec![gremsy::wrong_family(Family::MavlinkV1)] } else { Vec::new() };
+        GimbalDetails { faults, ..GimbalDetails::default() }
     }
 }
 

@@ -10,6 +10,7 @@ use crate::geometry::Angle;
 use crate::gimbals::capabilities::Capabilities;
 use crate::gimbals::details::GimbalDetails;
 use crate::gimbals::driver::{CommandOutcome, DriverOutput, GimbalDriver};
+use crate::gimbals::gremsy;
 use crate::gimbals::operation::{Operation, OperationError, OperationId};
 use crate::gimbals::report::{GimbalStatus, Identity, Report};
 use crate::gimbals::setpoint::Setpoint;
@@ -65,6 +66,8 @@ pub struct MavlinkV2Driver {
     /// How often 285 may still be asked for.
     rate_requests_left: u8,
     capabilities: Option<Capabilities>,
+    /// Its maker has a family of its own.
+    says_gremsy: bool,
     /// It has set a frame bit, so it is newer than them.
     sets_frame_bits: bool,
     /// Its `delta_yaw` was not zero once, so it does fill it in.
@@ -138,6 +141,7 @@ impl MavlinkV2Driver {
         self.informed = true;
         self.timers.cancel(Timer::AskInformation);
         self.timers.cancel(Timer::UseWithoutInformation);
+        self.says_gremsy = gremsy::is_vendor(&information.identity.vendor);
         self.become_known(information.identity, information.capabilities);
     }
 
@@ -315,6 +319,7 @@ impl GimbalDriver for MavlinkV2Driver {
     }
 
     fn details(&self, _now: Timestamp) -> GimbalDetails {
-        GimbalDetails::default()
+        let faults = if self.says_gremsy { vec![gremsy::wrong_family(Family::MavlinkV2)] } else { Vec::new() };
+        GimbalDetails { faults, ..GimbalDetails::default() }
     }
 }

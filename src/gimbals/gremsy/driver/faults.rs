@@ -29,6 +29,8 @@ pub enum Fault {
     NoParameters,
     /// It beats, and says nothing of how it is.
     NoStatus,
+    /// It says that somebody else made it.
+    OtherMaker(String),
     /// It does not become ready.
     NotAligned(Alignment),
     Sensor,
@@ -51,6 +53,7 @@ impl Fault {
             Self::ModeRefused => "refuses lock or follow",
             Self::NoParameters => "answers no parameters",
             Self::NoStatus => "does not tell its status",
+            Self::OtherMaker(_) => "says it is no Gremsy",
             Self::NotAligned(_) => "does not become ready",
             Self::Sensor => "sensor error",
             Self::MotorPhase => "motor phase error",
@@ -101,8 +104,15 @@ impl fmt::Display for Fault {
                  needed",
             ),
             Self::NoStatus => {
-                f.write_str("it sends no SYS_STATUS, so it is not known whether it is ready. Check the baud rate, or restart it")
+                f.write_str(
+                    "it sends no SYS_STATUS, as every Gremsy does, so it is not known whether it is ready. Is family right? If it is, \
+                     check the baud rate, or restart it",
+                )
             }
+            Self::OtherMaker(vendor) => write!(
+                f,
+                "it says that {vendor} made it, but its family is gremsy. Is family right? Leave the key out to have it found out"
+            ),
             Self::NotAligned(alignment) => {
                 let names: Vec<String> = alignment.names().collect();
                 write!(
@@ -185,6 +195,7 @@ mod tests {
             Fault::ModeRefused,
             Fault::NoParameters,
             Fault::NoStatus,
+            Fault::OtherMaker("STorM32".to_owned()),
             Fault::NotAligned(Alignment::ENCODER_ROLL),
             Fault::Sensor,
             Fault::MotorPhase,

@@ -5,7 +5,8 @@ use gimbald::wire::dialect::{MavMessage, PARAM_REQUEST_LIST_DATA, STATUSTEXT_DAT
 use gimbald::wire::ids::message;
 
 use super::*;
-use crate::support::script::NAN;
+use crate::support::script::{NAN, device_information, gimbal_heartbeat, usual_capabilities};
+use crate::support::world::GIMBAL;
 
 /// What the pilot reads.
 fn texts(world: &World, places: Places) -> Vec<String> {
@@ -176,4 +177,36 @@ fn a_gimbal_that_does_not_answer_is_named() {
     assert!(told.contains(&"camera: refuses lock or follow".to_owned()), "{told:?}");
     let (commands, _) = orders(&mut world, places);
     assert!(commands.iter().all(|command| command.command == command::USER_2), "{commands:?}");
+}
+
+/// "details.faults: Faults of this gimbal or its firmware, and what to do about them": a family that does not fit is the
+/// first thing that whoever configures a gimbal gets wrong.
+#[test]
+fn a_family_that_does_not_fit_is_named() {
+    let gimbal = |family| GimbalSettings { family, ..GimbalSettings::found("camera".to_owned()) };
+    let world_of = |family| World::empty(Settings { gimbals: vec![gimbal(family)], ..three_links() });
+    for family in [Family::MavlinkV2, Family::MavlinkV1] {
+        for generation in [Generation::V1, Generation::V2] {
+            let (mut world, places) = world_of(family);
+            world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
+            world.install(places.gimbal, Device::new(Timestamp::ZERO, device(generation)));
+            run(&mut world, places, 15 * SECOND);
+            let expected = format!(
+                "this gimbal says that it is a Gremsy, but its family is {}. Set family = \"gremsy\", or leave the key out",
+                family.name()
+            );
+            assert_eq!(faults(&world), [expected], "{generation:?}");
+        }
+    }
+
+    let (mut world, places) = world_of(Family::Gremsy);
+    for _ in 0..20 {
+        world.send(places.gimbal, GIMBAL, &gimbal_heartbeat());
+        run(&mut world, places, SECOND);
+    }
+    assert!(faults(&world).iter().any(|fault| fault.contains("Is family right?")), "{:?}", faults(&world));
+    let information = device_information(world.now, usual_capabilities());
+    world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_INFORMATION(information));
+    let other = "made it, but its family is gremsy. Is family right? Leave the key out to have it found out";
+    assert!(faults(&world).iter().any(|fault| fault.contains(other)), "{:?}", faults(&world));
 }
