@@ -402,8 +402,17 @@ impl GimbalDriver for MavlinkV1Driver {
         self.send_when_due(now);
     }
 
-    fn handle_operation(&mut self, _now: Timestamp, id: OperationId, _operation: Operation) {
-        self.outputs.push_back(DriverOutput::Operated { id, result: Err(OperationError::Unsupported) });
+    /// It is handed to its radio control as by a demand; nothing else has a message.
+    fn handle_operation(&mut self, now: Timestamp, id: OperationId, operation: Operation) {
+        let result = match operation {
+            Operation::RadioControl if self.settings.radio_control != V1RadioControl::None => {
+                self.wanted = Some(MountControl::RadioControl);
+                self.send_when_due(now);
+                Ok(())
+            }
+            _ => Err(OperationError::Unsupported),
+        };
+        self.outputs.push_back(DriverOutput::Operated { id, result });
     }
 
     fn handle_timeout(&mut self, now: Timestamp) {

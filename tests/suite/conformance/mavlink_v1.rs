@@ -5,10 +5,14 @@ mod streams;
 
 use std::time::Duration;
 
+use gimbald::actions::Action;
+use gimbald::bridge::Input;
 use gimbald::bridge::settings::Settings;
 use gimbald::gimbals::mavlink_v1::config::V1Settings;
+use gimbald::gimbals::operation::{OperationError, OperationId};
 use gimbald::gimbals::settings::{Family, GimbalSettings};
 use gimbald::gimbals::signs::Signs;
+use gimbald::manager::asked::NotDone;
 use gimbald::wire::MavId;
 use gimbald::wire::dialect::{
     COMMAND_LONG_DATA, CharArray, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA,
@@ -274,6 +278,42 @@ fn a_v2_client_hands_a_v1_gimbal_to_its_radio_control() {
     keep(&mut world);
     let status: Vec<GIMBAL_DEVICE_ATTITUDE_STATUS_DATA> = world.take_messages(places.ground);
     assert!(status.iter().all(|status| status.flags == 44), "{status:?}");
+}
+
+/// "Each reachable three ways": by its name it is handed over as by a client's demand, until the next one, and is not where
+/// it has no radio control.
+#[test]
+fn a_v1_gimbal_is_left_to_its_radio_control_by_its_name() {
+    use gimbald::gimbals::mavlink_v1::config::V1RadioControl;
+    let asked = |world: &mut World, command: &str, body: &str| {
+        let action = Action::of_command(command).expect(command);
+        let asked = action.read(None, body.as_bytes()).expect(body);
+        world.answers.clear();
+        let id = OperationId(world.now.as_micros());
+        world.input(Input::Asked { id, gimbal: "camera", asked: &asked });
+        world.run_for(SECOND / 10);
+        std::mem::take(&mut world.answers).into_iter().map(|(_, answer)| answer).collect::<Vec<_>>()
+    };
+    let (mut world, places) = with_gimbal(v1_gimbal());
+    assert_eq!(
+        asked(&mut world, "radio-control", ""),
+        [Err(NotDone::Operation(OperationError::Unsupported))],
+        "it has none"
+    );
+    assert_eq!(told(&mut world, places), [[0.0; 4]; 0]);
+
+    let v1 = V1Settings { radio_control: V1RadioControl::Mode, ..V1Settings::default() };
+    let (mut world, places) = with_gimbal(GimbalSettings { v1, ..v1_gimbal() });
+    assert_eq!(asked(&mut world, "point", r#"{"pitch_deg": -40}"#), [Ok(())]);
+    world.forget();
+    assert_eq!(asked(&mut world, "radio-control", ""), [Ok(())]);
+    for _ in 0..20 {
+        report(&mut world, places, -20.0, 0.0);
+        world.run_for(SECOND / 10);
+    }
+    assert_eq!(told(&mut world, places), [[0.0, 0.0, 0.0, 3.0]; 5], "at once and every half second, and nothing else");
+    assert_eq!(asked(&mut world, "point", r#"{"pitch_deg": -30}"#), [Ok(())]);
+    assert_eq!(told(&mut world, places), [[-30.0, 0.0, 0.0, 2.0]]);
 }
 
 /// A gimbal that wants it is configured once, and told the newest when it has answered; the answer is not the client's.
