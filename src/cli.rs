@@ -104,6 +104,7 @@ Exit codes: 0 when the daemon answered, 69 when not.")]
         subcommand_value_name = "COMMAND",
         after_help = "\
 Examples:
+  gimbald gimbal                                 which are there?
   gimbald gimbal camera                          how is it?
   gimbald gimbal camera control take
   gimbald gimbal camera point --pitch-deg -30 --yaw-deg 20
@@ -330,9 +331,9 @@ pub struct StatusArgs {
 
 #[derive(Debug, Args)]
 pub struct GimbalArgs {
-    /// The gimbal, as it is called in the status
+    /// The gimbal, as it is called in the status; without it and a command, those that there are
     #[arg(value_name = "NAME")]
-    pub name: String,
+    pub name: Option<String>,
 
     /// Where the daemon's page is; without it, where GIMBALD__HTTP__LISTEN or the configuration has it
     #[arg(long, global = true, display_order = 100, value_name = "URL")]

@@ -7,7 +7,7 @@ use clap::error::ErrorKind;
 use clap::{Arg, ArgAction, ArgMatches, Command, Error, FromArgMatches, Subcommand};
 use serde_json::Value;
 
-use crate::actions::{self, ACTIONS, Action, CONFIRM, Field, Kind};
+use crate::actions::{self, ACTIONS, Action, CONFIRM, Field, Kind, Wrong};
 
 /// What is to be done with a gimbal, besides showing it.
 #[derive(Clone, Debug)]
@@ -60,9 +60,40 @@ fn argument(field: &'static Field) -> Arg {
     let arg = match field.kind {
         Kind::Word(words) => arg.value_parser(PossibleValuesParser::new(words)),
         Kind::Flag => arg.value_parser(PossibleValuesParser::new(["on", "off"])),
-        Kind::Number { .. } | Kind::WholeOrWord { .. } | Kind::Name { .. } => arg,
+        Kind::Number { .. } | Kind::WholeOrWord { .. } | Kind::Name { .. } => {
+            arg.help(format!("{}; {}", field.about, field.kind.expected()))
+        }
     };
     if field.required { arg.required(true) } else { arg.long(field.name.replace('_', "-")) }
+}
+
+/// A field as it is typed; other words stay as they are.
+fn typed(action: &Action, name: &str) -> String {
+    match action.fields.iter().find(|field| field.name == name) {
+        Some(field) if field.required => name.to_uppercase(),
+        Some(_) => format!("--{}", name.replace('_', "-")),
+        None => name.to_owned(),
+    }
+}
+
+/// What is wrong, in the words of the command line.
+fn in_typed_words(action: &Action, wrong: Wrong) -> String {
+    match wrong {
+        Wrong::Unconfirmed { word } => {
+            format!("'{word}' can cost the camera or the flight; if it is meant, add --{}", confirmation(word))
+        }
+        Wrong::Value { name, found, expected } => {
+            format!("{}: found {found}; expected {expected}", typed(action, name))
+        }
+        Wrong::Nothing(names) => {
+            let names: Vec<String> = names.iter().map(|name| typed(action, name)).collect();
+            format!("nothing is asked for; expected at least one of {}", names.join(", "))
+        }
+        Wrong::Together(text) => text.split(' ').map(|word| typed(action, word)).collect::<Vec<_>>().join(" "),
+        Wrong::NotJson(_) | Wrong::Twice { .. } | Wrong::UnknownField { .. } | Wrong::Missing { .. } => {
+            wrong.to_string()
+        }
+    }
 }
 
 fn seconds(text: &str) -> Result<Duration, SecondsError> {
@@ -124,13 +155,8 @@ fn read(action: &'static Action, matches: &ArgMatches) -> Result<Act, Error> {
     let lasting = if action.command == "turn" { matches.get_one::<Duration>(LASTING).copied() } else { None };
     let body = actions::body(body);
     action.read(in_path.as_deref(), &body).map_err(|wrong| {
-        let text = match wrong {
-            actions::Wrong::Unconfirmed { word } => {
-                format!("'{word}' can cost the camera or the flight; if it is meant, add --{}\n", confirmation(word))
-            }
-            wrong => format!("{wrong}\n"),
-        };
-        Error::raw(ErrorKind::ValueValidation, text)
+        let mut command = command(action).bin_name(format!("gimbald gimbal NAME {}", action.command));
+        Error::raw(ErrorKind::ValueValidation, in_typed_words(action, wrong) + "\n").format(&mut command)
     })?;
     Ok(Act { action, in_path, body, lasting })
 }
@@ -221,11 +247,15 @@ mod tests {
             ("motors off", "'motors off' can cost the camera or the flight; if it is meant, add --yes-motors-off"),
             ("reboot", "'reboot' can cost the camera or the flight; if it is meant, add --yes-reboot"),
             ("shutdown --yes-reboot", "unexpected argument '--yes-reboot'"),
-            ("point", "nothing is asked for; expected at least one of pitch_deg, yaw_deg, roll_deg"),
-            ("point --pitch-deg down", "pitch_deg: found \"down\"; expected a number from -180 to 180"),
-            ("point --pitch-deg NaN", "pitch_deg: found \"NaN\"; expected a number from -180 to 180"),
-            ("point --pitch-deg inf", "pitch_deg: found \"inf\"; expected a number from -180 to 180"),
-            ("point --pitch-deg -181", "pitch_deg: found -181.0; expected a number from -180 to 180"),
+            ("point", "nothing is asked for; expected at least one of --pitch-deg, --yaw-deg, --roll-deg"),
+            ("point", "Usage: gimbald gimbal NAME point"),
+            ("limits tilt 5 -5", "MIN_DEG must not be above MAX_DEG"),
+            ("roi 91 0 0", "LATITUDE_DEG: found 91; expected a number from -90 to 90"),
+            ("point --help", "up is positive; a number from -180 to 180"),
+            ("point --pitch-deg down", "--pitch-deg: found \"down\"; expected a number from -180 to 180"),
+            ("point --pitch-deg NaN", "--pitch-deg: found \"NaN\"; expected a number from -180 to 180"),
+            ("point --pitch-deg inf", "--pitch-deg: found \"inf\"; expected a number from -180 to 180"),
+            ("point --pitch-deg -181", "--pitch-deg: found -181.0; expected a number from -180 to 180"),
             ("stream-rate raw_imu 0", "expected a whole number from 1 to 200, or off or default"),
             ("control grab", "possible values: take, release"),
             ("turn --yaw-dps 5 --for 0", "expected a number of seconds from 0.1 to 3600"),
@@ -241,8 +271,8 @@ mod tests {
     fn options_may_follow_the_command() {
         let arguments = read("stop --json --url http://drone:8080 --token-file t").expect("right");
         assert_eq!(
-            (arguments.name.as_str(), arguments.json, arguments.url.as_deref()),
-            ("camera", true, Some("http://drone:8080"))
+            (arguments.name.as_deref(), arguments.json, arguments.url.as_deref()),
+            (Some("camera"), true, Some("http://drone:8080"))
         );
         let arguments = read("--json").expect("right");
         assert!(arguments.order.is_none() && arguments.json);

@@ -148,10 +148,8 @@ fn daemon_settings(arguments: &DemoArgs, gimbal: Endpoint, autopilot: SocketAddr
 
 fn instructions(arguments: &DemoArgs, settings: &DaemonSettings, token_file: &Path) -> String {
     let name = settings.core.gimbals.first().map_or("gimbal-154", |gimbal| gimbal.name.as_str());
-    let url = match arguments.http {
-        HttpSettings::DEFAULT_LISTEN => String::new(),
-        other => format!(" --url http://{other}"),
-    };
+    // A configuration that is installed here may have its page elsewhere.
+    let url = format!(" --url http://{}", arguments.http);
     let listed: Vec<_> =
         settings.core.links.iter().map(|link| format!("    {:<10} {}", link.name, link.endpoint)).collect();
     format!(

@@ -35,6 +35,8 @@ const LISTEN_VARIABLE: &str = "GIMBALD__HTTP__LISTEN";
 enum GimbalError {
     #[error(transparent)]
     Client(#[from] ClientError),
+    #[error("the name of the gimbal is missing: gimbald gimbal NAME COMMAND; 'gimbald gimbal' lists them")]
+    NoName,
     #[error("control needs the token: name its file with --token-file, or in [http] token_file of {}", .0.display())]
     NoToken(PathBuf),
     #[error("the token file {} {error}{}", path.display(), if is_forbidden(error) { "; run it with sudo" } else { "" })]
@@ -45,6 +47,7 @@ impl GimbalError {
     fn exit_code(&self) -> ExitCode {
         match self {
             Self::Client(error) => error.exit_code(),
+            Self::NoName => ExitCode::Usage,
             Self::NoToken(_) => ExitCode::NoPermission,
             Self::Token { error, .. } if is_forbidden(error) => ExitCode::NoPermission,
             Self::Token { .. } => ExitCode::Config,
@@ -76,7 +79,14 @@ fn run(arguments: &GimbalArgs, output: &mut impl Write) -> Result<(), GimbalErro
     let target = Target::parse(&url(arguments))?;
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(ClientError::Output)?;
     let result = runtime.block_on(async {
-        let of_gimbal = format!("/gimbals/{}", percent_encoded(&arguments.name));
+        let Some(name) = &arguments.name else {
+            return if arguments.order.is_some() {
+                Err(GimbalError::NoName)
+            } else {
+                names(&target, arguments.json).await
+            };
+        };
+        let of_gimbal = format!("/gimbals/{}", percent_encoded(name));
         match &arguments.order {
             None => show(&target, &of_gimbal, arguments.json).await,
             Some(Order::Parameters { name }) => parameters(&target, &of_gimbal, name.as_deref(), arguments.json).await,
@@ -86,7 +96,7 @@ fn run(arguments: &GimbalArgs, output: &mut impl Write) -> Result<(), GimbalErro
                 Ok(if arguments.json {
                     as_it_is(&answer)
                 } else {
-                    format!("{}: {} done\n", printable_text(&arguments.name), act.action.command)
+                    format!("{}: {} done\n", printable_text(name), act.action.command)
                 })
             }
         }
@@ -95,6 +105,22 @@ fn run(arguments: &GimbalArgs, output: &mut impl Write) -> Result<(), GimbalErro
     runtime.shutdown_background();
     output.write_all(result?.as_bytes()).and_then(|()| output.flush()).map_err(ClientError::Output)?;
     Ok(())
+}
+
+/// Those that there are, a line for each.
+async fn names(target: &Target, json: bool) -> Result<String, GimbalError> {
+    let answer = target.get("/gimbals").await?;
+    if json {
+        return Ok(as_it_is(&answer));
+    }
+    let value: Value = serde_json::from_slice(&answer).map_err(|error| target.not_gimbald(error))?;
+    match printable(value).get("gimbals") {
+        Some(Value::Array(names)) if names.is_empty() => Ok("there is none yet\n".to_owned()),
+        Some(Value::Array(names)) => {
+            Ok(names.iter().filter_map(Value::as_str).map(|name| format!("{name}\n")).collect())
+        }
+        _ => Err(target.not_gimbald("no list of gimbals").into()),
+    }
 }
 
 async fn show(target: &Target, of_gimbal: &str, json: bool) -> Result<String, GimbalError> {
