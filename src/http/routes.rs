@@ -8,7 +8,7 @@ use axum::extract::{Request, State};
 use axum::http::header::{
     CACHE_CONTROL, CONTENT_SECURITY_POLICY, REFERRER_POLICY, WWW_AUTHENTICATE, X_CONTENT_TYPE_OPTIONS,
 };
-use axum::http::{HeaderName, HeaderValue, StatusCode};
+use axum::http::{HeaderName, HeaderValue, StatusCode, Uri};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
@@ -94,16 +94,29 @@ async fn openapi() -> Response {
     Json(openapi::description()).into_response()
 }
 
-async fn unknown_path() -> Response {
-    Refusal::new(
-        StatusCode::NOT_FOUND,
-        "no such page; there are /, /api/v1/status, /api/v1/gimbals, /api/v1/openapi.json, /healthz and /readyz",
-    )
-    .into_response()
+async fn unknown_path(uri: Uri) -> Response {
+    let of_gimbal = uri.path().strip_prefix(GIMBALS).and_then(|rest| rest.strip_prefix('/')?.split_once('/'));
+    let error = match of_gimbal {
+        Some(_) => {
+            let parts: Vec<_> = gimbals::PARTS.iter().map(|(part, _)| *part).collect();
+            let actions: Vec<_> = ACTIONS.iter().map(|action| action.path).collect();
+            format!(
+                "a gimbal has nothing of that name; there are, to be read: {}; to be asked for with POST: {}",
+                parts.join(", "),
+                actions.join(", ")
+            )
+        }
+        None => {
+            "no such page; there are /, /api/v1/status, /api/v1/gimbals, /api/v1/openapi.json, /healthz and /readyz"
+                .to_owned()
+        }
+    };
+    Refusal::new(StatusCode::NOT_FOUND, error).into_response()
 }
 
 async fn other_method() -> Response {
-    Refusal::new(StatusCode::METHOD_NOT_ALLOWED, "another method is needed here; Allow says which").into_response()
+    let error = "another method is needed here; Allow says which: GET reads, POST with the token asks for something";
+    Refusal::new(StatusCode::METHOD_NOT_ALLOWED, error).into_response()
 }
 
 /// Checks who is asked for, and says how far each answer may be trusted.

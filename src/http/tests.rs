@@ -184,10 +184,18 @@ fn what_is_not_there_is_refused_as_json() {
         let error = json!({"error": "no such page; there are /, /api/v1/status, /api/v1/gimbals, /api/v1/openapi.json, /healthz and /readyz"});
         assert_eq!((answer.status, answer.json()), (404, error), "{path}");
     }
+    for method in ["GET", "POST"] {
+        let path = "/api/v1/gimbals/camera/locck";
+        let answer = window.ask(&format!("{method} {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"));
+        let error = answer.json()["error"].as_str().expect("a sentence").to_owned();
+        assert_eq!(answer.status, 404, "{method}");
+        assert!(error.starts_with("a gimbal has nothing of that name; there are, to be read: attitude, "), "{error}");
+        assert!(error.contains("; to be asked for with POST: control, point, turn, stop, lock, "), "{error}");
+    }
     for method in ["POST", "PUT", "DELETE", "OPTIONS", "PATCH", "TRACE"] {
         let answer =
             window.ask(&format!("{method} /api/v1/status HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"));
-        let error = json!({"error": "another method is needed here; Allow says which"});
+        let error = json!({"error": "another method is needed here; Allow says which: GET reads, POST with the token asks for something"});
         assert_eq!((answer.status, answer.json(), answer.header("allow")), (405, error, Some("GET,HEAD")), "{method}");
     }
 }
