@@ -121,14 +121,22 @@ pub const ACTIONS: &[Action] = &[
             }))
         },
     },
-    plain("mapping", "mapping", "Look straight down, the top of the picture to the nose", |_| {
-        operation(Operation::Mapping)
-    }),
+    plain(
+        "mapping",
+        "mapping",
+        "Look straight down as for a survey, by the gimbal's own function; yaw is its affair",
+        |_| operation(Operation::Mapping),
+    ),
     Action {
         path: "reset",
         command: "reset",
         about: "Turn the camera back by the gimbal's own function",
-        fields: &[word("mode", "which axes to where", &RESET_MODES)],
+        fields: &[word(
+            "mode",
+            "yaw: to the nose; pitch: to the horizon; pitch_down_up: straight down, or up where the gimbal hangs the other \
+             way; pitch_mapping: straight down as for a survey; axes that are not named stay",
+            &RESET_MODES,
+        )],
         word: None,
         read: |values| {
             operation(Operation::Reset(match values.word("mode") {
@@ -165,7 +173,11 @@ pub const ACTIONS: &[Action] = &[
         command: "stream-rate",
         about: "Set how often the gimbal sends one of its messages",
         fields: &[
-            word("stream", "the message", &["encoders", "mount_orientation", "attitude_status", "raw_imu"]),
+            word(
+                "stream",
+                "the message; a v1 Gremsy does not send attitude_status",
+                &["encoders", "mount_orientation", "attitude_status", "raw_imu"],
+            ),
             required(Field {
                 name: "rate_hz",
                 about: "times a second; default is as often as the gimbal does by itself",
@@ -212,9 +224,13 @@ pub const ACTIONS: &[Action] = &[
         about: "Set how one axis moves; what is left out stays as it is",
         fields: &[
             AXIS,
-            scale("follow_speed", "how fast it follows the vehicle"),
-            scale("follow_smoothing", "how smoothly it follows the vehicle"),
-            positive("follow_window_deg", "how far the vehicle may turn before it follows, degrees", 180.0),
+            scale("follow_speed", "how fast it follows the vehicle; not for roll"),
+            scale("follow_smoothing", "how smoothly it follows the vehicle; not for roll"),
+            positive(
+                "follow_window_deg",
+                "how far the vehicle may turn before it follows, degrees; not for roll",
+                180.0,
+            ),
             positive("control_speed_dps", "its highest speed under control, degrees per second", 720.0),
             scale("control_smoothing", "how smoothly it starts and stops under control"),
             Field {

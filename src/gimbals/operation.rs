@@ -17,7 +17,7 @@ pub enum Operation {
     Restart(Restart),
     /// Holds the camera where it looks, yaw to the vehicle's nose or to North.
     SetYawMode(YawMode),
-    /// Looks straight down with the picture's top towards the nose, for surveys.
+    /// Looks straight down, for surveys; what becomes of yaw is the gimbal's affair.
     Mapping,
     Reset(ResetMode),
     /// Leaves the gimbal to its own radio receiver until the next demand.
