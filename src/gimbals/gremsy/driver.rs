@@ -11,8 +11,10 @@ mod generation;
 mod mode_change;
 mod mount;
 mod operations;
+mod rotation;
 mod start_up;
 mod steering;
+mod stopping;
 mod streams;
 mod supervision;
 mod telling;
@@ -49,6 +51,7 @@ use generation::Search;
 use mode_change::ModeChange;
 use mount::Mount;
 use operations::Operations;
+use stopping::Stopping;
 use streams::Streams;
 use vehicle_turn::VehicleTurn;
 
@@ -90,6 +93,10 @@ pub struct GremsyDriver {
     is_retracted: bool,
     /// How it was last told to turn in v2.
     turning: Option<Turning>,
+    /// In v2, or before it is known which it is, a rotation that is being stopped.
+    stopping: Option<Stopping>,
+    /// In v2, it is handed to its radio control when it has stopped.
+    hand_over_waits: bool,
     /// That it starts was reported, or is no news.
     is_start_told: bool,
     /// Its radio receiver was given the gimbal.
@@ -155,6 +162,8 @@ impl GremsyDriver {
             mode_change: None,
             is_retracted: false,
             turning: None,
+            stopping: None,
+            hand_over_waits: false,
             is_start_told: true,
             is_handed_over: false,
             operations: Operations::default(),
@@ -172,7 +181,7 @@ impl GremsyDriver {
     fn handle_ack(&mut self, frame: &Frame<'_>) {
         let Some(ack) = frame.decode::<COMMAND_ACK_DATA>() else { return };
         if ack.command == command::DO_MOUNT_CONTROL && ack.result != CommandResult::InProgress as u8 {
-            self.mount.handle_answer();
+            self.mount.handle_answer(ack.result == CommandResult::Accepted as u8);
             self.faults.clear(|fault| *fault == Fault::NoAnswers);
         }
     }
@@ -238,7 +247,7 @@ impl GremsyDriver {
         self.judge(now, device);
         self.drain_parameters();
         self.steer_on(now, device);
-        self.handle_operations_timeout(now);
+        self.handle_operations_timeout(now, device);
     }
 }
 
@@ -348,6 +357,10 @@ impl GimbalDriver for GremsyDriver {
         self.go_on(now);
     }
 
+    fn may_be_turning(&self) -> bool {
+        self.mount.may_be_turning() || self.turning.is_some() || self.stopping.is_some()
+    }
+
     fn poll_output(&mut self) -> Option<DriverOutput> {
         self.outputs.pop_front()
     }
@@ -358,7 +371,8 @@ impl GimbalDriver for GremsyDriver {
         let mode_change = self.mode_change.map(|change| change.poll_timeout());
         let mount = self.mount.poll_timeout(self.condition());
         let rest = [self.v2.poll_timeout(), self.parameters.poll_timeout(), self.operations.poll_timeout()];
-        [timer, search, mode_change, mount].into_iter().chain(rest).flatten().min()
+        let stopping = self.stopping.map(|stopping| stopping.poll_timeout());
+        [timer, search, mode_change, mount, stopping].into_iter().chain(rest).flatten().min()
     }
 
     fn details(&self, now: Timestamp) -> GimbalDetails {

@@ -8,6 +8,7 @@ mod faults;
 mod operations;
 mod start_up;
 mod steering;
+mod stopping;
 mod vendor_commands;
 
 use std::time::Duration;

@@ -2,11 +2,13 @@
 //!
 //! Angles are kept to the vehicle's nose in its mode FOLLOW and to North in LOCK, so a mode is asked for once and waited
 //! for before the first angle in it. It goes on turning at a rate until it is told otherwise: rates are repeated, and end
-//! with zeros, which wait for nothing.
+//! with zeros, which wait for nothing. Whatever else is wanted of a gimbal that may be turning waits for the answer to one
+//! of these, except an angle that can be said at once.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use super::rotation::Rotation;
 use crate::geometry::{AngularRate, GimbalAngles};
 use crate::gimbals::gremsy::packet::{self, ResetMode};
 use crate::gimbals::operation::YawMode;
@@ -27,6 +29,9 @@ const MOVES_AT_MOST: Duration = Duration::from_secs(10);
 
 /// A rate is stopped when whoever steers has not repeated it for so long.
 pub const DEAD_MAN: Duration = Duration::from_millis(500);
+
+/// Zeros to one that is not heard are repeated so often.
+const REPEAT_UNHEARD: Duration = Duration::from_secs(1);
 
 /// And no order is carried on with that was not said for so long: whoever steers has let go of it.
 const LET_GO: Duration = Duration::from_secs(1);
@@ -73,6 +78,7 @@ impl Order {
 /// How the gimbal is at this moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Condition {
+    pub is_heard: bool,
     /// It may be told where to look.
     pub is_ready: bool,
     /// It looks where it was told to.
@@ -119,6 +125,9 @@ pub struct Mount {
     /// When it was last said.
     refreshed: Timestamp,
     sent: Option<(Timestamp, Order)>,
+    rotation: Rotation,
+    /// When it was last told to stop, since it was told to turn.
+    stopped: Option<Timestamp>,
     /// An order that is given out once was.
     is_given: bool,
     mode: Mode,
@@ -135,6 +144,8 @@ impl Default for Mount {
             changed: Timestamp::ZERO,
             refreshed: Timestamp::ZERO,
             sent: None,
+            rotation: Rotation::default(),
+            stopped: None,
             is_given: false,
             mode: Mode::Unknown,
             retraction: Retraction::No,
@@ -157,12 +168,9 @@ impl Mount {
     }
 
     /// It is to do something else than it was ordered, or nothing: a rotation is stopped first.
-    pub fn drop_order(&mut self, now: Timestamp, device: MavId) {
-        if self.may_turn() {
-            self.stop(now, device);
-        }
+    pub fn drop_order(&mut self, now: Timestamp, device: MavId, condition: Condition) {
         self.wanted = None;
-        self.sent = None;
+        self.stop_when_due(now, device, condition);
     }
 
     /// It was restarted or not heard for long: it does not know its mode any more, nor what it was told.
@@ -183,9 +191,19 @@ impl Mount {
         self.wanted = None;
     }
 
-    /// Whether it was last told to turn.
-    pub fn may_turn(&self) -> bool {
-        self.sent.is_some_and(|(_, sent)| sent.turns())
+    /// Whether it was told to turn, and that it has stopped is not known.
+    pub fn may_be_turning(&self) -> bool {
+        self.rotation.may_turn()
+    }
+
+    /// What it was told before is not known: it is stopped.
+    pub fn assume_turning(&mut self) {
+        self.rotation.assume();
+    }
+
+    /// It stands without its motors, or is told by other means.
+    pub fn forget_rotation(&mut self) {
+        self.rotation = Rotation::default();
     }
 
     /// Whether an order has switched the motors off.
@@ -223,7 +241,8 @@ impl Mount {
     }
 
     /// It answered an order.
-    pub fn handle_answer(&mut self) {
+    pub fn handle_answer(&mut self, is_accepted: bool) {
+        self.rotation.handle_answer(is_accepted);
         self.unanswered = 0;
     }
 
@@ -266,9 +285,13 @@ impl Mount {
             tracing::warn!(%device, "a rotation that nobody repeats is stopped");
             self.stop(now, device);
         }
-        if now.since(self.refreshed) >= LET_GO {
+        if self.wanted.is_some() && now.since(self.refreshed) >= LET_GO {
             self.wanted = None;
             self.sent = None;
+        }
+        if !self.is_sayable(condition) && self.may_be_turning() {
+            self.stop_when_due(now, device, condition);
+            return;
         }
         let Some(wanted) = self.wanted else { return };
         if wanted.is_stop() {
@@ -279,7 +302,7 @@ impl Mount {
             return;
         }
         match wanted {
-            Order::Home | Order::Retract | Order::RadioControl => self.give(now, device),
+            Order::Home | Order::Retract | Order::RadioControl => self.give(device),
             Order::Point { mode, .. } | Order::Turn { mode, .. } => {
                 if self.has_motors(now, device, condition) && self.is_in_mode(now, device, mode) {
                     self.send_when_due(now, device, condition);
@@ -290,8 +313,13 @@ impl Mount {
 
     /// When [`advance`](Self::advance) is due. `None` while it waits for the gimbal.
     pub fn poll_timeout(&self, condition: Condition) -> Option<Timestamp> {
-        let wanted = self.wanted?;
+        let stops = self.may_be_turning() && !self.is_sayable(condition);
+        let stop = stops.then(|| self.stop_due(condition));
+        let Some(wanted) = self.wanted else { return stop };
         let dead_man = Some(self.refreshed + if wanted.turns() { DEAD_MAN } else { LET_GO });
+        if stops {
+            return stop.min(dead_man);
+        }
         let waits = match (wanted, self.mode, self.retraction) {
             _ if wanted.is_stop() => None,
             _ if !condition.is_ready => return dead_man,
@@ -322,7 +350,30 @@ impl Mount {
         self.wanted = Some(Order::Turn { rates: [AngularRate::ZERO; 3], mode });
         self.changed = now;
         self.sent = None;
-        self.send_when_due(now, device, Condition { is_ready: true, is_there: false, motors_on: true });
+        self.say(now, device, Order::Turn { rates: [AngularRate::ZERO; 3], mode });
+    }
+
+    /// Whether what is wanted can be said at this moment, and so ends a rotation itself.
+    fn is_sayable(&self, condition: Condition) -> bool {
+        match self.wanted {
+            Some(wanted) if wanted.is_stop() => true,
+            Some(Order::Point { mode, .. } | Order::Turn { mode, .. }) => {
+                condition.is_ready && self.retraction == Retraction::No && self.mode == Mode::Is(mode)
+            }
+            Some(Order::Home | Order::Retract | Order::RadioControl) | None => false,
+        }
+    }
+
+    /// Zeros for a gimbal that may be turning while something else is wanted, or nothing.
+    fn stop_when_due(&mut self, now: Timestamp, device: MavId, condition: Condition) {
+        if self.may_be_turning() && self.stop_due(condition) <= now {
+            self.say(now, device, Order::Turn { rates: [AngularRate::ZERO; 3], mode: YawMode::Follow });
+        }
+    }
+
+    fn stop_due(&self, condition: Condition) -> Timestamp {
+        let every = if condition.is_heard { REPEAT_MOVING } else { REPEAT_UNHEARD };
+        self.stopped.map_or(Timestamp::ZERO, |at| at + every)
     }
 
     /// Motors that an order switched off are switched on first; those that somebody else did are not.
@@ -360,14 +411,9 @@ impl Mount {
         false
     }
 
-    fn give(&mut self, now: Timestamp, device: MavId) {
+    fn give(&mut self, device: MavId) {
         if self.is_given {
             return;
-        }
-        if self.may_turn() {
-            let wanted = self.wanted;
-            self.stop(now, device);
-            self.wanted = wanted;
         }
         let Some(command) = self.given(device) else { return };
         self.is_given = true;
@@ -396,14 +442,24 @@ impl Mount {
         if !is_due {
             return;
         }
-        let command = match wanted {
+        self.say(now, device, wanted);
+    }
+
+    fn say(&mut self, now: Timestamp, device: MavId, order: Order) {
+        let command = match order {
             Order::Point { angles, .. } => {
                 packet::rotate_to(device, GimbalAngles { yaw: angles.yaw.wrapped(), ..angles })
             }
             Order::Turn { rates, .. } => packet::turn_at(device, rates),
             Order::Home | Order::Retract | Order::RadioControl => return,
         };
-        self.sent = Some((now, wanted));
+        self.sent = Some((now, order));
+        self.rotation.handle_sent(now, order.turns());
+        if order.turns() {
+            self.stopped = None;
+        } else if order.is_stop() {
+            self.stopped = Some(now);
+        }
         if self.unanswered == 0 {
             self.unanswered_since = now;
         }
@@ -422,6 +478,8 @@ impl Mount {
         }
         let for_now = at.since(self.changed);
         let moves = match wanted {
+            // Until it is known to be heard.
+            _ if self.may_be_turning() => true,
             Order::Turn { .. } if wanted.is_stop() => for_now < MOVES_AT_LEAST,
             Order::Turn { .. } => true,
             _ => for_now < MOVES_AT_LEAST || (!condition.is_there && for_now < MOVES_AT_MOST),

@@ -5,7 +5,7 @@ use super::streams;
 use super::writes;
 use super::{Generation, GremsyDriver};
 use crate::geometry::{Angle, Attitude, EarthFrame, GimbalAngles, VehicleFrame, Yaw};
-use crate::gimbals::driver::{CommandOutcome, DriverOutput};
+use crate::gimbals::driver::{CommandOutcome, DriverOutput, GimbalDriver};
 use crate::gimbals::gremsy::modes::ControlMode;
 use crate::gimbals::gremsy::packet::{self, RebootAction};
 use crate::gimbals::gremsy::parameters::ParameterTable;
@@ -23,6 +23,9 @@ use crate::wire::ids::{CommandResult, message};
 /// So many commands are waited for at once.
 const CAPACITY: usize = 16;
 
+/// A gimbal that may be turning has stopped by then, or does not hear.
+const STOPS_WITHIN: std::time::Duration = std::time::Duration::from_secs(2);
+
 /// Motors that are switched on take 3 s, and the status comes once a second.
 const MOTORS_SHOW_WITHIN: std::time::Duration = std::time::Duration::from_secs(5);
 const MODE_SHOWS_WITHIN: std::time::Duration = std::time::Duration::from_secs(3);
@@ -39,6 +42,15 @@ const POINT_EVERY: std::time::Duration = std::time::Duration::from_millis(100);
 pub struct Operations {
     pending: Vec<Pending>,
     pointing: Option<RepeatedPoint>,
+    /// Those that wait until it has stopped.
+    held: Vec<Held>,
+}
+
+#[derive(Clone, Debug)]
+struct Held {
+    id: OperationId,
+    operation: Operation,
+    until: Timestamp,
 }
 
 #[derive(Clone, Debug)]
@@ -82,13 +94,15 @@ impl Operations {
             Stage::Shown { until } => Some(until),
             Stage::Answer { .. } => None,
         });
-        shown.chain(self.pointing.map(|pointing| pointing.next)).min()
+        let held = self.held.iter().map(|held| held.until);
+        shown.chain(self.pointing.map(|pointing| pointing.next)).chain(held).min()
     }
 
     /// Gives all of them up.
     pub fn clear(&mut self) -> Vec<OperationId> {
         let pointing = self.pointing.take().map(|pointing| pointing.id);
-        self.pending.drain(..).map(|pending| pending.id).chain(pointing).collect()
+        let held = self.held.drain(..).map(|held| held.id);
+        self.pending.drain(..).map(|pending| pending.id).chain(pointing).chain(held).collect()
     }
 }
 
@@ -99,7 +113,32 @@ impl GremsyDriver {
         };
         if operation.ends_demand() {
             self.drop_demand(now, device);
+            if self.may_be_turning() {
+                if self.operations.held.len() >= CAPACITY {
+                    return self.operated(id, Err(OperationError::Busy));
+                }
+                let (operation, until) = (operation.clone(), now + STOPS_WITHIN);
+                return self.operations.held.push(Held { id, operation, until });
+            }
         }
+        self.begin_operation(now, id, device, operation);
+    }
+
+    /// Goes on with what waited for it to stop. What would switch its motors off is done in any case.
+    fn release_held(&mut self, now: Timestamp, device: MavId) {
+        let is_stopped = !self.may_be_turning();
+        let (due, rest) = self.operations.held.drain(..).partition(|held| is_stopped || held.until <= now);
+        self.operations.held = rest;
+        for Held { id, operation, .. } in due {
+            if is_stopped || matches!(operation, Operation::Motors(_) | Operation::Restart(_)) {
+                self.begin_operation(now, id, device, &operation);
+            } else {
+                self.operated(id, Err(OperationError::NoAnswer));
+            }
+        }
+    }
+
+    fn begin_operation(&mut self, now: Timestamp, id: OperationId, device: MavId, operation: &Operation) {
         match operation {
             Operation::RefreshParameters => self.parameters.refresh_for(now, id),
             Operation::SetParameter { name, value } => self.parameters.set(now, id, &[(name, *value)]),
@@ -297,7 +336,8 @@ impl GremsyDriver {
         }
     }
 
-    pub(super) fn handle_operations_timeout(&mut self, now: Timestamp) {
+    pub(super) fn handle_operations_timeout(&mut self, now: Timestamp, device: MavId) {
+        self.release_held(now, device);
         let is_late = |pending: &Pending| matches!(pending.stage, Stage::Shown { until } if until <= now);
         let (late, rest) = self.operations.pending.drain(..).partition(is_late);
         self.operations.pending = rest;
@@ -329,7 +369,9 @@ impl GremsyDriver {
     fn await_reboot(&mut self, now: Timestamp) {
         self.reboot_announced = Some(now);
         self.is_booting = true;
+        self.is_handed_over = false;
         self.mount.handle_restart();
+        self.forget_rotation();
         self.effect.forget();
         self.outputs.push_back(DriverOutput::Report(Report::Restarted));
     }

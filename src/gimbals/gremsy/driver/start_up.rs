@@ -3,12 +3,14 @@
 use std::time::Duration;
 
 use super::generation::{Evidence, Generation, Step};
+use super::stopping::Stopping;
 use super::{GremsyDriver, TICK, Timer};
 use crate::gimbals::driver::DriverOutput;
 use crate::gimbals::gremsy::packet;
 use crate::gimbals::gremsy::parameters::{Parameter, ParameterTable};
 use crate::gimbals::gremsy::version::FirmwareVersion;
 use crate::gimbals::report::Report;
+use crate::gimbals::setpoint::Turning;
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 use crate::wire::dialect::MavMessage;
@@ -30,6 +32,7 @@ impl GremsyDriver {
         // To whoever steers, the first start is none of a gimbal that was there before.
         self.is_start_told = self.reported.is_none();
         self.reboot_announced = None;
+        self.stop_v2(now);
         self.heard.status = None;
         self.streams.forget_heard();
         self.timers.set(Timer::AskInformation, now);
@@ -82,6 +85,12 @@ impl GremsyDriver {
             Some(Step::Decided(generation)) => {
                 tracing::info!(%device, generation = generation.name(), "the gimbal's protocol is known");
                 let speaks = generation == Generation::V2;
+                if speaks && self.mount.may_be_turning() {
+                    self.mount.forget_rotation();
+                    self.stopping = Some(Stopping::new(now, Turning::STOPPED));
+                } else if !speaks {
+                    self.stopping = None;
+                }
                 self.outputs.push_back(DriverOutput::Report(Report::SpeaksForItself(speaks)));
                 self.report_alive(device);
                 self.set_streams(now, device, generation);

@@ -4,6 +4,7 @@ use super::effect::Pose;
 use super::faults::Fault;
 use super::mode_change::{self, ModeChange};
 use super::mount::{Condition, DEAD_MAN, MountOutput, Order};
+use super::stopping::Stopping;
 use super::{Generation, GremsyDriver, Timer};
 use crate::geometry::{Angle, AngularRate, GimbalAngles, Yaw, YawFrame};
 use crate::gimbals::driver::{DriverOutput, GimbalDriver};
@@ -34,11 +35,16 @@ impl GremsyDriver {
         match self.search.decided() {
             Some(Generation::V1) => {
                 let order = order_of(self.about_north(now, setpoint));
-                self.is_handed_over = order == Order::RadioControl;
+                self.is_handed_over &= order == Order::RadioControl;
                 self.mount.order(now, order);
                 self.mount.advance(now, device, self.condition());
             }
-            Some(Generation::V2) => self.steer_v2(now, device, setpoint, is_stop),
+            Some(Generation::V2) => self.steer_v2(now, setpoint, is_stop),
+            // To stop takes no knowledge: zeros in either protocol.
+            None if is_stop => {
+                self.mount.assume_turning();
+                self.stopping.get_or_insert(Stopping::new(now, Turning::STOPPED));
+            }
             None => {}
         }
         // Those that are off for a retract, or on their way, are no news.
@@ -85,18 +91,17 @@ impl GremsyDriver {
         }
     }
 
-    fn steer_v2(&mut self, now: Timestamp, device: MavId, setpoint: Setpoint, is_stop: bool) {
+    fn steer_v2(&mut self, now: Timestamp, setpoint: Setpoint, is_stop: bool) {
         if !is_stop && (!self.is_present || self.is_booting) {
             return;
         }
         if let Setpoint::Point(Pointing { radio_control: RadioControl::Exclusive, .. }) = setpoint {
-            if !self.is_handed_over {
-                self.is_handed_over = true;
-                self.outputs.push_back(DriverOutput::Command(Box::new(packet::hand_to_rc(device))));
-            }
+            self.stop_v2(now);
+            self.hand_over_waits = !self.is_handed_over;
             return;
         }
         self.is_handed_over = false;
+        self.hand_over_waits = false;
         match self.mode_change {
             // It is to move, and its motors are being switched on for that.
             Some(change) if change.asker().is_none() && !is_stop => return,
@@ -120,28 +125,58 @@ impl GremsyDriver {
                 return;
             }
         }
-        self.turning = match setpoint {
-            Setpoint::Turn(turning) if !turning.is_zero() => Some(turning),
-            _ => None,
-        };
-        if self.turning.is_some() {
-            self.timers.set(Timer::DeadMan, now + DEAD_MAN);
+        match setpoint {
+            Setpoint::Turn(turning) if !turning.is_zero() => {
+                self.turning = Some(turning);
+                self.stopping = None;
+                self.timers.set(Timer::DeadMan, now + DEAD_MAN);
+            }
+            Setpoint::Turn(_) => {
+                self.stop_v2(now);
+                if let Some(stopping) = &mut self.stopping {
+                    stopping.handle_sent(now);
+                }
+            }
+            _ => (self.turning, self.stopping) = (None, None),
         }
         self.v2.handle_setpoint(now, setpoint);
     }
 
+    /// Begins to stop what it was told to turn in v2.
+    pub(super) fn stop_v2(&mut self, now: Timestamp) {
+        if let Some(turning) = self.turning.take() {
+            self.stopping = Some(Stopping::new(now, turning));
+        }
+    }
+
+    fn stop_on_in_v2(&mut self, now: Timestamp, device: MavId) {
+        if let Some(stopping) = &mut self.stopping {
+            if stopping.is_over(now) {
+                self.stopping = None;
+            } else if let Some(zero) = stopping.handle_timeout(now) {
+                self.v2.handle_setpoint(now, zero);
+            }
+            self.drain_v2(now, device);
+        }
+        if self.hand_over_waits && self.stopping.is_none() {
+            self.hand_over_waits = false;
+            self.is_handed_over = true;
+            self.outputs.push_back(DriverOutput::Command(Box::new(packet::hand_to_rc(device))));
+        }
+    }
+
     /// Whoever steers has not repeated a rotation: it ends.
     pub(super) fn stop_unrepeated(&mut self, now: Timestamp) {
-        if let Some(turning) = self.turning.take() {
+        if self.turning.is_some() {
             tracing::warn!("a rotation that nobody repeats is stopped");
-            self.v2.handle_setpoint(now, Setpoint::Turn(turning.stopped()));
+            self.stop_v2(now);
         }
     }
 
     /// A setpoint as the driver for v2 devices makes it: roll and pitch are always level here, rates are all numbers, and
     /// firmware that does not know the bits of the yaw frame does not get them.
     pub(super) fn send_v2_setpoint(&mut self, mut setpoint: GIMBAL_DEVICE_SET_ATTITUDE_DATA) {
-        if self.search.decided() != Some(Generation::V2) {
+        if self.search.decided() == Some(Generation::V1) {
             return;
         }
         let mut flags = GimbalFlags::from_bits_retain(setpoint.flags);
@@ -185,7 +220,9 @@ impl GremsyDriver {
     /// Something else than its setpoint was asked of it.
     pub(super) fn drop_demand(&mut self, now: Timestamp, device: MavId) {
         self.effect.handle_target(None);
-        self.mount.drop_order(now, device);
+        self.stop_v2(now);
+        self.hand_over_waits = false;
+        self.mount.drop_order(now, device, self.condition());
         self.drain_mount();
         if let Some(change) = self.mode_change.take()
             && let Some(id) = change.asker()
@@ -199,7 +236,8 @@ impl GremsyDriver {
             let step = change.handle_timeout(now);
             self.handle_mode_step(device, step);
         }
-        if self.search.decided() == Some(Generation::V1) {
+        self.stop_on_in_v2(now, device);
+        if self.search.decided() != Some(Generation::V2) {
             self.mount.advance(now, device, self.condition());
         }
         self.drain_mount();
@@ -209,7 +247,11 @@ impl GremsyDriver {
         while let Some(output) = self.mount.poll_output() {
             match output {
                 MountOutput::Send(command) => self.send_command(command),
-                MountOutput::Command(command) => self.outputs.push_back(DriverOutput::Command(Box::new(command))),
+                MountOutput::Command(command) => {
+                    let target = MavId::new(command.target_system, command.target_component);
+                    self.is_handed_over |= command == packet::hand_to_rc(target);
+                    self.outputs.push_back(DriverOutput::Command(Box::new(command)));
+                }
                 MountOutput::ModeRefused => self.raise(Fault::ModeRefused),
                 MountOutput::ModeTaken => self.faults.clear(|fault| *fault == Fault::ModeRefused),
                 MountOutput::StaysRetracted => self.raise(Fault::StaysRetracted),
@@ -223,6 +265,7 @@ impl GremsyDriver {
 
     pub(super) fn condition(&self) -> Condition {
         Condition {
+            is_heard: self.is_alive,
             is_ready: self.is_alive && self.is_present && self.is_active && !self.is_booting,
             is_there: self.is_there(),
             motors_on: self.heard.status.is_some_and(|(_, status)| status.motors_on()),

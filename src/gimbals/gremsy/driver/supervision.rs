@@ -41,6 +41,12 @@ impl GremsyDriver {
         self.begin(now, device);
     }
 
+    /// It has started again, and nothing of before turns it.
+    pub(super) fn forget_rotation(&mut self) {
+        self.mount.forget_rotation();
+        (self.turning, self.stopping) = (None, None);
+    }
+
     pub(super) fn handle_heard(&mut self, now: Timestamp, device: MavId) {
         self.heard.latest = now;
         self.timers.set(Timer::Lost, now + LOST_AFTER);
@@ -115,6 +121,9 @@ impl GremsyDriver {
         if status.activity.contains(Activity::STARTING_UP) && !std::mem::replace(&mut self.is_start_told, true) {
             self.outputs.push_back(DriverOutput::Report(Report::Restarted));
             self.mount.handle_lost();
+        }
+        if status.activity.contains(Activity::STARTING_UP) {
+            self.forget_rotation();
         }
         if was_running && status.activity.contains(Activity::STARTING_UP) {
             self.restart(now, device);

@@ -1,5 +1,6 @@
 use super::*;
 use crate::geometry::{AngularRate, YawFrame};
+use crate::gimbals::gremsy::packet;
 use crate::gimbals::setpoint::{RadioControl, Stabilised};
 use crate::wire::dialect::{GIMBAL_DEVICE_SET_ATTITUDE_DATA, HEARTBEAT_DATA, MessageData, SYS_STATUS_DATA};
 use crate::wire::ids::mav_state;
@@ -24,16 +25,20 @@ fn setpoints(driver: &mut GremsyDriver) -> Vec<GIMBAL_DEVICE_SET_ATTITUDE_DATA> 
     all
 }
 
-/// A gimbal that beats and is ready, without parameters, for so many milliseconds.
-fn run(driver: &mut GremsyDriver, from: u64, to: u64) -> Vec<(u64, GIMBAL_DEVICE_SET_ATTITUDE_DATA)> {
-    let heartbeat = HEARTBEAT_DATA {
+fn heartbeat() -> HEARTBEAT_DATA {
+    HEARTBEAT_DATA {
         custom_mode: 0,
         mavtype: 26,
         autopilot: 8,
         base_mode: 0,
         system_status: mav_state::ACTIVE,
         mavlink_version: 3,
-    };
+    }
+}
+
+/// A gimbal that beats and is ready, without parameters, for so many milliseconds.
+fn run(driver: &mut GremsyDriver, from: u64, to: u64) -> Vec<(u64, GIMBAL_DEVICE_SET_ATTITUDE_DATA)> {
+    let heartbeat = heartbeat();
     let status = SYS_STATUS_DATA {
         onboard_control_sensors_present: 0,
         onboard_control_sensors_enabled: 0,
@@ -89,5 +94,54 @@ fn a_rate_in_v2_that_nobody_repeats_is_stopped() {
     let sent = run(&mut driver, 12_000, 16_000);
 
     let rates: Vec<(u64, bool)> = sent.iter().map(|(at, sent)| (*at, sent.angular_velocity_z == 0.0)).collect();
-    assert_eq!(rates, [(12_000, false), (12_500, true)]);
+    // It answers none of them, so they are said for a second.
+    let zeros = (12_500..13_500).step_by(100).map(|at| (at, true));
+    assert_eq!(rates, [(12_000, false)].into_iter().chain(zeros).collect::<Vec<_>>());
+}
+
+/// A stop takes no knowledge of the gimbal: before it is known what it speaks, zeros in both protocols, until it answers
+/// one or is known not to speak v1.
+#[test]
+fn a_stop_is_said_before_the_gimbal_is_known() {
+    let mut driver = GremsyDriver::new(GremsySettings::default());
+    driver.adopt(Timestamp::ZERO, GIMBAL);
+    hear(&mut driver, Timestamp::ZERO, &heartbeat());
+    assert_eq!(zeros(&mut driver), (0, 0));
+
+    driver.handle_setpoint(Timestamp::ZERO, Setpoint::Turn(Turning::STOPPED));
+
+    assert_eq!(zeros(&mut driver), (1, 1));
+    assert!(driver.may_be_turning());
+    let (mut v1, mut v2) = (0, 0);
+    for millis in (10..3_000).step_by(10) {
+        driver.handle_timeout(Timestamp::from_millis(millis));
+        let (more_v1, more_v2) = zeros(&mut driver);
+        (v1, v2) = (v1 + more_v1, v2 + more_v2);
+    }
+    assert_eq!((v1, v2), (29, 9));
+    let ack = COMMAND_ACK_DATA {
+        command: command::DO_MOUNT_CONTROL,
+        result: CommandResult::Accepted as u8,
+        progress: 0,
+        result_param2: 0,
+        target_system: 1,
+        target_component: 191,
+    };
+    // One for each that may still be answered.
+    for _ in 0..6 {
+        hear(&mut driver, Timestamp::from_secs(3), &ack);
+    }
+    assert!(!driver.may_be_turning());
+}
+
+/// Zeros of v1 and of v2 that are to be sent.
+fn zeros(driver: &mut GremsyDriver) -> (usize, usize) {
+    let (mut v1, mut v2) = (0, 0);
+    while let Some(output) = driver.poll_output() {
+        let DriverOutput::Message(message) = output else { continue };
+        v1 += usize::from(*message == MavMessage::COMMAND_LONG(packet::turn_at(GIMBAL, [AngularRate::ZERO; 3])));
+        v2 += usize::from(matches!(*message, MavMessage::GIMBAL_DEVICE_SET_ATTITUDE(zero)
+            if (zero.angular_velocity_x, zero.angular_velocity_y, zero.angular_velocity_z) == (0.0, 0.0, 0.0)));
+    }
+    (v1, v2)
 }

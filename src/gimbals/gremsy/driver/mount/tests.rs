@@ -2,7 +2,7 @@ use super::*;
 use crate::geometry::Angle;
 
 const GIMBAL: MavId = MavId::new(1, 154);
-const READY: Condition = Condition { is_ready: true, is_there: false, motors_on: true };
+const READY: Condition = Condition { is_heard: true, is_ready: true, is_there: false, motors_on: true };
 
 fn at(millis: u64) -> Timestamp {
     Timestamp::from_millis(millis)
@@ -165,19 +165,89 @@ fn an_order_that_nobody_repeats_is_let_go() {
     assert_eq!((mount.wanted(), mount.poll_timeout(READY)), (None, None));
 }
 
-/// An operation takes its place: the rotation ends before it.
+fn stop() -> MountOutput {
+    MountOutput::Send(packet::turn_at(GIMBAL, [AngularRate::ZERO; 3]))
+}
+
+/// What is sent, and when, while nobody says anything.
+fn silent(mount: &mut Mount, from: u64, to: u64, condition: Condition) -> Vec<(u64, MountOutput)> {
+    let mut sent = Vec::new();
+    for millis in from..to {
+        if mount.poll_timeout(condition).is_some_and(|due| due <= at(millis)) {
+            mount.advance(at(millis), GIMBAL, condition);
+            assert!(mount.poll_timeout(condition).is_none_or(|due| due > at(millis)), "never passes at {millis}");
+        }
+        sent.extend(drain(mount).into_iter().map(|output| (millis, output)));
+    }
+    sent
+}
+
+/// An operation takes its place: zeros go out until the gimbal has answered one.
 #[test]
 fn an_order_that_is_dropped_stops_what_turns() {
     let mut mount = following();
     stream(&mut mount, 0, 200, turn(20.0), READY);
-    mount.drop_order(at(200), GIMBAL);
-    assert_eq!(drain(&mut mount), [MountOutput::Send(packet::turn_at(GIMBAL, [AngularRate::ZERO; 3]))]);
-    assert_eq!(mount.poll_timeout(READY), None);
+    mount.handle_answer(true);
+    mount.handle_answer(true);
+    mount.drop_order(at(200), GIMBAL, READY);
+    assert_eq!(drain(&mut mount), [stop()]);
+    let sent = silent(&mut mount, 200, 1_550, READY);
+    let expected: Vec<_> = (300..1_550).step_by(100).map(|millis| (millis, stop())).collect();
+    assert_eq!((sent, mount.may_be_turning()), (expected, true));
+    mount.handle_answer(true);
+    assert!(!mount.may_be_turning());
+    assert_eq!((silent(&mut mount, 1_550, 4_000, READY), mount.poll_timeout(READY)), (vec![], None));
 
     let mut mount = following();
     stream(&mut mount, 0, 200, point(-10.0, 0.0, YawMode::Follow), READY);
-    mount.drop_order(at(200), GIMBAL);
+    mount.drop_order(at(200), GIMBAL, READY);
     assert_eq!(drain(&mut mount), []);
+}
+
+/// Whatever takes the place of a rotation and cannot be said at once: the gimbal is stopped before, and knows it.
+#[test]
+fn nothing_that_has_to_wait_lets_it_turn_on() {
+    let not_ready = Condition { is_ready: false, ..READY };
+    let angle = |mode| point(-10.0, 0.0, mode);
+    for (order, condition, then) in [
+        (angle(YawMode::Lock), READY, Some(packet::lock(GIMBAL))),
+        (angle(YawMode::Follow), not_ready, None),
+        (turn(20.0), not_ready, None),
+        (Order::Home, READY, Some(packet::reset(GIMBAL, ResetMode::PitchAndYaw))),
+        (Order::Home, not_ready, None),
+        (Order::Retract, READY, Some(packet::set_motors(GIMBAL, false))),
+        (Order::RadioControl, READY, Some(packet::hand_to_rc(GIMBAL))),
+    ] {
+        let mut mount = following();
+        stream(&mut mount, 0, 1_000, turn(20.0), READY);
+        let sent = stream(&mut mount, 1_000, 3_000, order, condition);
+        let expected: Vec<_> = (1_000..3_000).step_by(100).map(|millis| (millis, stop())).collect();
+        assert_eq!(sent, expected, "{order:?}");
+        for _ in 0..20 {
+            mount.handle_answer(true);
+        }
+        let sent = stream(&mut mount, 3_000, 4_000, order, condition);
+        let expected: Vec<_> = then.into_iter().map(|command| (3_000, MountOutput::Command(command))).collect();
+        assert_eq!((sent, mount.may_be_turning()), (expected, false), "{order:?}");
+    }
+    // An angle in the mode that it is in ends it by itself, and is repeated until it is answered.
+    let mut mount = following();
+    stream(&mut mount, 0, 1_000, turn(20.0), READY);
+    let there = Condition { is_there: true, ..READY };
+    let sent = stream(&mut mount, 1_000, 4_000, angle(YawMode::Follow), there);
+    assert!(sent.len() == 30 && sent.iter().all(|(_, output)| *output != stop()), "{sent:?}");
+}
+
+/// Also one that is not heard may hear: it is told less often, until it has answered.
+#[test]
+fn one_that_is_lost_while_it_turns_is_stopped_when_it_is_back() {
+    let mut mount = following();
+    stream(&mut mount, 0, 200, turn(20.0), READY);
+    mount.handle_lost();
+    let unheard = Condition { is_heard: false, is_ready: false, ..READY };
+    let expected: Vec<_> = (200..4_000).step_by(1_000).map(|millis| (millis, stop())).collect();
+    assert_eq!(silent(&mut mount, 200, 4_000, unheard), expected);
+    assert_eq!(silent(&mut mount, 4_000, 4_100, READY), [(4_000, stop())]);
 }
 
 /// "RETRACT: 31010 p7=0 (motors off) if allowed"; "leave RETRACT: 31010 p7=1, wait ACK + ec1 bit 0x10, then target"
@@ -230,6 +300,6 @@ fn orders_that_are_never_answered_are_noticed() {
     stream(&mut mount, 0, 2_900, point(-10.0, 0.0, YawMode::Follow), READY);
     assert!(!mount.is_unanswered(at(2_900)));
     assert!(mount.is_unanswered(at(3_000)));
-    mount.handle_answer();
+    mount.handle_answer(true);
     assert!(!mount.is_unanswered(at(3_000)));
 }

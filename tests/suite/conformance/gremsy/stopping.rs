@@ -1,0 +1,163 @@
+//! "A gimbal that turns after its operator is gone is our worst bug": what takes the place of a rotation, on a line or with
+//! a gimbal that does not do it.
+
+use std::cell::Cell;
+use std::rc::Rc;
+
+use gimbald::geometry::AngularRate;
+use gimbald::gimbals::gremsy::packet;
+use gimbald::gimbals::operation::{OperationError, YawMode};
+use gimbald::manager::asked::NotDone;
+use gimbald::sim::peer::{Peer, PlatformMotion};
+use gimbald::wire::dialect::MessageData;
+
+use super::*;
+use crate::support::script::NAN;
+use crate::support::world::GIMBAL;
+
+/// What the gimbal does not hear.
+#[derive(Clone, Debug, Default)]
+struct Deaf {
+    /// A command.
+    command: Rc<Cell<Option<u16>>>,
+    /// So many setpoints of either generation.
+    setpoints: Rc<Cell<u32>>,
+}
+
+#[derive(Debug)]
+struct HardOfHearing {
+    device: Device,
+    deaf: Deaf,
+}
+
+impl HardOfHearing {
+    fn hears(&self, bytes: &[u8]) -> bool {
+        let id = u32::from_le_bytes([bytes[7], bytes[8], bytes[9], 0]);
+        let number = (id == COMMAND_LONG_DATA::ID).then(|| u16::from_le_bytes([bytes[38], bytes[39]]));
+        let is_setpoint = number == Some(command::DO_MOUNT_CONTROL) || id == GIMBAL_DEVICE_SET_ATTITUDE_DATA::ID;
+        if is_setpoint && self.deaf.setpoints.get() > 0 {
+            self.deaf.setpoints.set(self.deaf.setpoints.get() - 1);
+            return false;
+        }
+        number.is_none() || number != self.deaf.command.get()
+    }
+}
+
+impl Peer for HardOfHearing {
+    fn handle_received(&mut self, now: Timestamp, bytes: &[u8]) {
+        if self.hears(bytes) {
+            self.device.handle_received(now, bytes);
+        }
+    }
+
+    fn handle_timeout(&mut self, now: Timestamp) {
+        self.device.handle_timeout(now);
+    }
+
+    fn poll_output(&mut self) -> Option<Vec<u8>> {
+        self.device.poll_output()
+    }
+
+    fn poll_timeout(&self) -> Option<Timestamp> {
+        self.device.poll_timeout()
+    }
+
+    fn handle_reboot(&mut self, now: Timestamp) {
+        self.device.handle_reboot(now);
+    }
+
+    fn handle_disturbance(&mut self, now: Timestamp, motion: PlatformMotion) {
+        self.device.handle_disturbance(now, motion);
+    }
+}
+
+/// One that turns to the right by 5 degrees per second since a demand of the ground's.
+fn turning(generation: Generation) -> (World, Places, Deaf) {
+    let (mut world, places) = without_gimbal(GremsySettings::default());
+    world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
+    let deaf = Deaf::default();
+    let device = Device::new(Timestamp::ZERO, device(generation));
+    world.install(places.gimbal, HardOfHearing { device, deaf: deaf.clone() });
+    run(&mut world, places, 20 * SECOND);
+    assert_eq!(seen(&world).details.stage.as_deref(), Some("running"));
+    demand(&mut world, places, [NAN, NAN, 0.0, 5.0, 44.0]);
+    run(&mut world, places, 2 * SECOND);
+    assert!(looks(&world).1 > 5.0, "{:?}", looks(&world));
+    world.forget();
+    (world, places, deaf)
+}
+
+/// The same for who has control by the gimbal's name.
+fn turning_by_name(generation: Generation) -> (World, Places, Deaf) {
+    let (mut world, places, deaf) = turning(generation);
+    take_control(&mut world);
+    run(&mut world, places, SECOND);
+    let (pitch, yaw) = (AngularRate::ZERO, AngularRate::from_degrees_per_second(5.0));
+    let asked = Asked::Turn { roll: None, pitch, yaw, yaw_frame: YawFrame::Vehicle };
+    let id = OperationId(1_000 + world.answers.len() as u64);
+    world.input(Input::Asked { id, gimbal: "camera", asked: &asked });
+    assert_eq!(world.answers.last(), Some(&(id, Ok(()))));
+    let before = looks(&world).1;
+    run(&mut world, places, SECOND);
+    assert!(looks(&world).1 > before + 2.0, "{before} {:?}", looks(&world));
+    world.forget();
+    (world, places, deaf)
+}
+
+fn assert_rests(world: &mut World, places: Places) {
+    let before = looks(world);
+    run(world, places, 3 * SECOND);
+    let after = looks(world);
+    assert!((after.1 - before.1).abs() < 0.5, "it turns on: {before:?} {after:?}");
+}
+
+/// The replacement of a rotation takes a mode that the gimbal does not change to: it stands all the same.
+#[test]
+fn an_angle_in_another_mode_that_it_does_not_take_stops_it() {
+    let (mut world, places, deaf) = turning(Generation::V1);
+    deaf.command.set(Some(packet::lock(GIMBAL).command));
+    demand(&mut world, places, [0.0, 90.0, NAN, NAN, 92.0]);
+    run(&mut world, places, SECOND);
+    assert_rests(&mut world, places);
+    let zeros = told(&mut world, places, command::DO_MOUNT_CONTROL);
+    assert!(!zeros.is_empty() && zeros.iter().all(|zero| *zero == packet::turn_at(GIMBAL, Default::default())));
+}
+
+/// The zeros that an operation begins with are lost: it is not done before one was heard.
+#[test]
+fn what_is_asked_by_name_waits_until_it_has_stopped() {
+    for generation in [Generation::V1, Generation::V2] {
+        for operation in [Operation::SetYawMode(YawMode::Follow), Operation::RadioControl] {
+            let (mut world, places, deaf) = turning_by_name(generation);
+            deaf.setpoints.set(5);
+            assert_eq!(operate(&mut world, places, operation.clone()), Some(Ok(())), "{generation:?} {operation:?}");
+            assert_rests(&mut world, places);
+            // One that hears none of them is not left alone.
+            let (mut world, places, deaf) = turning_by_name(Generation::V1);
+            deaf.setpoints.set(u32::MAX);
+            let no_answer = Some(Err(NotDone::Operation(OperationError::NoAnswer)));
+            assert_eq!(operate(&mut world, places, operation), no_answer);
+            deaf.setpoints.set(0);
+            // It goes back to where it was when it was to stop.
+            run(&mut world, places, 4 * SECOND);
+            assert_rests(&mut world, places);
+        }
+    }
+}
+
+/// Neutral, and the hand-over to its radio control, by a demand whose first zeros are lost.
+#[test]
+fn neutral_and_radio_control_come_after_the_stop() {
+    for generation in [Generation::V1, Generation::V2] {
+        for flags in [2.0, 300.0] {
+            let (mut world, places, deaf) = turning(generation);
+            if flags != 2.0 && generation == Generation::V2 {
+                continue;
+            }
+            deaf.setpoints.set(3);
+            demand(&mut world, places, [NAN, NAN, NAN, NAN, flags]);
+            run(&mut world, places, 4 * SECOND);
+            assert_rests(&mut world, places);
+        }
+    }
+}
