@@ -20,14 +20,19 @@ impl GimbalManager {
         if is_missed && !is_told { self.status_message(now) } else { None }
     }
 
-    /// The flags for 281: those of the setpoint, with the device's own state bits; the device's while there is none.
+    /// The flags for 281: those of the setpoint, with the device's own state bits; the device's while there is none. A gimbal
+    /// that is none of v2 is told angles from the nose also when yaw is held to North, as 285 has it.
     pub fn flags(&self) -> GimbalFlags {
         let of_device = GimbalFlags::ACCEPTS_YAW_IN_EARTH_FRAME | GimbalFlags::RC_EXCLUSIVE | GimbalFlags::RC_MIXED;
         let reported = self.status.map_or(GimbalFlags::empty(), |(_, status)| status.flags);
-        match self.tracking.last() {
+        let mut flags = match self.tracking.last() {
             Some(setpoint) => setpoint.flags().difference(of_device) | reported.intersection(of_device),
             None => reported.intersection(GimbalFlags::from_bits_retain(0x3ff)),
+        };
+        if self.voice.is_some() && self.tracking.is_locked() {
+            flags |= GimbalFlags::YAW_LOCK;
         }
+        flags
     }
 
     /// A 281 to everybody, besides the regular ones.

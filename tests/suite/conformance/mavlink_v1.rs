@@ -144,6 +144,21 @@ fn statements_35_and_36_yaw_from_north_is_told_from_the_nose() {
     assert_near(*told.last().expect("it is told"), [-10.0, 0.0, -20.0, 2.0]);
 }
 
+/// 281: "High level gimbal manager flags currently applied": yaw is held to North also where that is our doing.
+#[test]
+fn a_yaw_that_we_hold_to_north_is_shown_as_held() {
+    let (mut world, places) = with_gimbal(v1_gimbal());
+    turn_vehicle(&mut world, places, 70.0);
+    let flags = |world: &World| world.snapshot().gimbals[0].flags.clone();
+    let from_the_nose = ["roll_lock", "pitch_lock", "yaw_in_vehicle_frame"];
+    look(&mut world, places, [-10.0, 20.0], 44.0);
+    assert_eq!(flags(&world), from_the_nose);
+    look(&mut world, places, [-10.0, 90.0], 92.0);
+    assert_eq!(flags(&world), ["roll_lock", "pitch_lock", "yaw_lock", "yaw_in_vehicle_frame"]);
+    look(&mut world, places, [-10.0, 20.0], 44.0);
+    assert_eq!(flags(&world), from_the_nose);
+}
+
 /// Gimbal statement 37: "v2 rate on a rate-less v1 gimbal is integrated at 50 Hz, clamped at the limits, and stops" after
 /// `rate_timeout_s`: here at 50 Hz by `setpoint_rate_hz`, which is 20 by default (D11).
 #[test]
