@@ -175,7 +175,7 @@ fn text_of(kind: Kind, who: MavId, names: Names, event: &Event) -> String {
 /// old programs do not look at the answer, and messages have none.
 fn misread(reason: &str) -> Option<&'static str> {
     match reason {
-        "looks_like_centidegrees" => Some("looks like centidegrees"),
+        "looks_like_centidegrees" => Some("see accept_centidegrees"),
         "looks_like_a_place" => Some("looks like a place"),
         "place_in_the_first_parameters" => Some("place in params 1 to 3"),
         _ => None,

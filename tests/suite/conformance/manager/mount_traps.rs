@@ -57,7 +57,7 @@ fn statement_38_centidegrees_are_taken_where_they_are_accepted() {
 }
 
 /// "Trap recognition": what was refused for how it looks is said on the pilot's screen, of each sender once in ten seconds.
-/// Gimbal statement 38: "DENIED with a warning."
+/// Gimbal statement 38: "DENIED with a warning", which names the setting.
 #[test]
 fn statement_38_the_pilot_is_told_what_looks_like_centidegrees() {
     let (mut world, places) = with_gimbal();
@@ -74,7 +74,7 @@ fn statement_38_the_pilot_is_told_what_looks_like_centidegrees() {
     world.run_for(SECOND);
     let heard = world.take(places.ground);
     let texts: Vec<String> = of::<STATUSTEXT_DATA>(&heard).iter().map(text_of).collect();
-    assert_eq!(texts, ["gimbal-154: 255/190: looks like centidegrees", "gimbal-154: 1/192: place in params 1 to 3"]);
+    assert_eq!(texts, ["gimbal-154: 255/190: see accept_centidegrees", "gimbal-154: 1/192: place in params 1 to 3"]);
     let rejected = world.snapshot().gimbals[0].rejected.clone();
     assert_eq!(rejected["255/190"]["looks_like_centidegrees"], 5);
     assert_eq!(rejected["255/190"]["looks_like_a_place"], 1);
