@@ -2,11 +2,13 @@
 
 use std::borrow::Cow;
 use std::net::SocketAddr;
+use std::sync::LazyLock;
 use std::time::Duration;
 
+use axum::body::Bytes;
 use axum::extract::{Request, State};
 use axum::http::header::{
-    CACHE_CONTROL, CONTENT_SECURITY_POLICY, REFERRER_POLICY, WWW_AUTHENTICATE, X_CONTENT_TYPE_OPTIONS,
+    CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, REFERRER_POLICY, WWW_AUTHENTICATE, X_CONTENT_TYPE_OPTIONS,
 };
 use axum::http::{HeaderName, HeaderValue, StatusCode, Uri};
 use axum::middleware::{Next, from_fn_with_state};
@@ -90,8 +92,10 @@ async fn readyz(State(window): State<Window>) -> Response {
     (status, Json(readiness)).into_response()
 }
 
+/// The same for as long as we run, and not small: whoever asks for it again and again is not to cost more than a page.
 async fn openapi() -> Response {
-    Json(openapi::description()).into_response()
+    static DESCRIPTION: LazyLock<Bytes> = LazyLock::new(|| openapi::description().to_string().into());
+    ([(CONTENT_TYPE, "application/json")], DESCRIPTION.clone()).into_response()
 }
 
 async fn unknown_path(uri: Uri) -> Response {
