@@ -27,9 +27,13 @@ const QUIET: Duration = Duration::from_secs(1);
 const LIST_TRIES: u8 = 3;
 /// Somebody else who reads all the time does not keep us from going on for longer than this.
 const LONGEST_WAIT: Duration = Duration::from_secs(20);
+/// Nor is the silence after the last one waited for longer than this.
+const LONGEST_SETTLING: Duration = Duration::from_secs(2);
 
 /// Two parameters are read at least so far apart …
 const READ_SPACING: Duration = Duration::from_millis(10);
+/// … what others asked for delays one by no more than this …
+const READ_DELAY: Duration = Duration::from_millis(100);
 /// … the next round begins so long after the one before …
 const ROUND_PAUSE: Duration = Duration::from_millis(500);
 /// … and one that was read so often in vain does not exist.
@@ -107,6 +111,8 @@ enum Phase {
     /// What is missing is read, one by one.
     Reading {
         queue: VecDeque<Known>,
+        /// When the next one is read at the latest.
+        latest: Timestamp,
     },
     /// All was read; a while of silence, and it is settled.
     Settling {
@@ -218,11 +224,11 @@ impl Parameters {
                 self.timers.set(Timer::Quiet, (now + QUIET).min(*since + LONGEST_WAIT));
             }
             // What somebody else asked for goes first.
-            Phase::Reading { .. } => {
+            Phase::Reading { latest, .. } => {
                 let at = self.timers.at(Timer::Read).unwrap_or(now);
-                self.timers.set(Timer::Read, at.max(now + READ_SPACING));
+                self.timers.set(Timer::Read, at.max((now + READ_SPACING).min(*latest)));
             }
-            Phase::Settling { since } => self.timers.set(Timer::Quiet, (now + QUIET).min(*since + LONGEST_WAIT)),
+            Phase::Settling { since } => self.timers.set(Timer::Quiet, (now + QUIET).min(*since + LONGEST_SETTLING)),
             Phase::Idle | Phase::Settled => {}
         }
         let wanted = self.changes.current().filter(|(current, _)| *current == name).map(|(_, value)| value);
@@ -335,13 +341,13 @@ impl Parameters {
             self.phase = Phase::Settling { since: now };
             self.timers.set(Timer::Quiet, now.max(self.heard + QUIET));
         } else {
-            self.phase = Phase::Reading { queue };
+            self.phase = Phase::Reading { queue, latest: now };
             self.read_next(now);
         }
     }
 
     fn read_next(&mut self, now: Timestamp) {
-        let Phase::Reading { queue } = &mut self.phase else { return };
+        let Phase::Reading { queue, latest } = &mut self.phase else { return };
         if queue.is_empty() {
             self.begin_round(now);
             return;
@@ -354,10 +360,12 @@ impl Parameters {
             let by_index = *tries >= TRIES_BY_NAME && !self.answers_to_names;
             *tries += 1;
             let pause = if queue.is_empty() { ROUND_PAUSE } else { READ_SPACING };
+            *latest = now + pause + READ_DELAY;
             self.timers.set(Timer::Read, now + pause);
             self.send_read(known, by_index);
             return;
         }
+        *latest = now + ROUND_PAUSE + READ_DELAY;
         self.timers.set(Timer::Read, now + ROUND_PAUSE);
     }
 

@@ -202,6 +202,26 @@ fn a_gimbal_without_parameters_settles_too() {
     assert_eq!(line.parameters.values().count(), 0);
 }
 
+/// Somebody else has the gimbal tell its values without end.
+#[test]
+fn what_others_ask_for_does_not_keep_it_from_settling() {
+    let mut line = Line::new(&["BETA", "GAMMA"]);
+    let name = CharArray::from("BETA");
+    let value = PARAM_VALUE_DATA { param_value: 11.0, param_count: 2, param_index: 0, param_id: name, param_type: 4 };
+    let bytes = encode_to_vec(GIMBAL, 0, &value);
+
+    line.parameters.refresh(line.now, GIMBAL);
+    for _ in 0..6_000 {
+        line.run_for(5);
+        let frame = DatagramFrames::new(&bytes).next_frame().expect("a frame");
+        line.parameters.handle_received(line.now, &frame);
+    }
+
+    let settled = line.done.first().map(|(at, _)| *at);
+    assert!(settled.is_some_and(|at| at < 26_000), "{:?}", line.done);
+    assert!(line.parameters.is_missing("ALPHA"));
+}
+
 /// Gimbal statement 13: "PARAM_SET writes an int16 number as its float value with param_type 4; the golden PARAM_SET frame
 /// matches."
 #[test]

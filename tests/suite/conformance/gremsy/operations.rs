@@ -4,8 +4,8 @@ use gimbald::geometry::AxisLimits;
 use gimbald::gimbals::gremsy::modes::{self, ControlMode};
 use gimbald::gimbals::gremsy::packet::{self, MessageRate};
 use gimbald::gimbals::operation::{
-    Axis, AxisMotion, EncoderUnit, MotorAxis, MotorControl, Motors, OperationError, RadioType, ResetMode, Stream,
-    StreamRate, YawMode,
+    Axis, AxisMotion, EncoderUnit, MotorAxis, MotorControl, Motors, OperationError, RadioType, ResetMode, Restart,
+    Stream, StreamRate, YawMode,
 };
 use gimbald::manager::asked::NotDone;
 use gimbald::wire::dialect::{COMMAND_ACK_DATA, MavMessage, PARAM_REQUEST_LIST_DATA};
@@ -141,6 +141,26 @@ fn radio_control_has_it_until_the_next_demand() {
         let (mut world, places) = controlled(generation);
         assert_eq!(operate(&mut world, places, Operation::RadioControl), Some(Ok(())), "{generation:?}");
         assert_eq!(orders(&mut world, places), (vec![packet::hand_to_rc(GIMBAL)], vec![]));
+        // It is steered from then on, for as long as anybody likes.
+        for pitch in [-20.0, -30.0] {
+            point(&mut world, pitch, 10.0);
+            run(&mut world, places, 5 * SECOND);
+            assert_looks(&world, pitch, 10.0);
+        }
+        // Also where the demand names one axis only.
+        assert_eq!(operate(&mut world, places, Operation::RadioControl), Some(Ok(())), "{generation:?}");
+        for yaw in [20.0, 30.0] {
+            turn_to(&mut world, yaw);
+            run(&mut world, places, 5 * SECOND);
+            assert_looks(&world, -30.0, yaw);
+        }
+        // And after it was started again while its radio control had it.
+        assert_eq!(operate(&mut world, places, Operation::RadioControl), Some(Ok(())), "{generation:?}");
+        assert_eq!(operate(&mut world, places, Operation::Restart(Restart::Reboot)), Some(Ok(())), "{generation:?}");
+        run(&mut world, places, 20 * SECOND);
+        point(&mut world, -20.0, 10.0);
+        run(&mut world, places, 5 * SECOND);
+        assert_looks(&world, -20.0, 10.0);
     }
 }
 
@@ -385,4 +405,14 @@ fn a_demand_ends_what_is_being_changed() {
         world.answers.iter().find(|(id, _)| *id == OperationId(77)).map(|(_, answer)| answer.clone()),
         failed(OperationError::NoEffect(text))
     );
+}
+
+/// A yaw from the nose only.
+fn turn_to(world: &mut World, yaw: f64) {
+    let yaw = AxisDemand { angle: Some(Angle::from_degrees(yaw)), rate: None };
+    let (roll, pitch) = (AxisDemand::default(), AxisDemand::default());
+    let asked = Asked::Point { roll, pitch, yaw, yaw_frame: YawFrame::Vehicle };
+    let id = OperationId(1_000 + world.answers.len() as u64);
+    world.input(Input::Asked { id, gimbal: "camera", asked: &asked });
+    assert_eq!(world.answers.last(), Some(&(id, Ok(()))));
 }
