@@ -60,6 +60,8 @@ impl GremsyDriver {
     fn stage(&self) -> &'static str {
         if !self.is_alive {
             "searching"
+        } else if self.is_booting {
+            "restarting"
         } else if self.is_present {
             "running"
         } else if self.parameters.is_settled() {

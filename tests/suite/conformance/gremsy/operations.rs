@@ -157,7 +157,9 @@ fn radio_control_has_it_until_the_next_demand() {
         // And after it was started again while its radio control had it.
         assert_eq!(operate(&mut world, places, Operation::RadioControl), Some(Ok(())), "{generation:?}");
         assert_eq!(operate(&mut world, places, Operation::Restart(Restart::Reboot)), Some(Ok(())), "{generation:?}");
+        assert_eq!(seen(&world).details.stage.as_deref(), Some("restarting"));
         run(&mut world, places, 20 * SECOND);
+        assert_eq!(seen(&world).details.stage.as_deref(), Some("running"));
         point(&mut world, -20.0, 10.0);
         run(&mut world, places, 5 * SECOND);
         assert_looks(&world, -20.0, 10.0);
