@@ -2,7 +2,7 @@
 //!
 //! Runs on a thread of its own, so that nothing a browser does delays a frame. It sees the core through a
 //! [`CoreHandle`] only: it asks for a snapshot and shows the one that the core publishes, and gives on what is asked.
-//! Reading needs no token; control does ([`control`]).
+//! Reading needs no token; control does (`control`).
 
 #[cfg(test)]
 pub(crate) mod canned;

@@ -356,11 +356,10 @@ mod tests {
 
     /// A peer behind a pseudo-terminal, which understands one of the baud rates that are tried, counted from one.
     ///
-    /// A pseudo-terminal passes bytes on at any rate; the scan says which one is set.
+    /// A pseudo-terminal passes bytes on at any rate; the scan says which one is set. Nobody but the scan has its near end
+    /// open: a process that another test starts would inherit it, and the port would be in use.
     struct Plugged {
         path: PathBuf,
-        /// Never opened by the peer, but there for as long as it is.
-        far: Option<OwnedFd>,
         said: Said,
         stop: Sender<()>,
         thread: JoinHandle<usize>,
@@ -371,12 +370,13 @@ mod tests {
             let pty = openpty(None, None).expect("a pseudo-terminal");
             fcntl(pty.master.as_fd(), FcntlArg::F_SETFL(OFlag::O_NONBLOCK)).expect("it takes the flag");
             let path = ttyname(&pty.slave).expect("it has a name");
+            drop(pty.slave);
             let (stop, stopped) = channel();
             let said = Said::default();
             let heard = said.clone();
             let thread =
                 std::thread::spawn(move || live(peer, &pty.master, || heard.attempts() == understood, &stopped));
-            Self { path, far: Some(pty.slave), said, stop, thread }
+            Self { path, said, stop, thread }
         }
 
         /// Scans the port under the name `path`: what came of it, what was found, what was said.
@@ -481,7 +481,7 @@ mod tests {
     /// "It asks a running daemon first and never opens a port that a process holds."
     #[test]
     fn a_port_of_the_running_daemon_is_left_alone() {
-        let mut gimbal = Plugged::new(Device::new(Timestamp::ZERO, DeviceSettings::default()), 1);
+        let gimbal = Plugged::new(Device::new(Timestamp::ZERO, DeviceSettings::default()), 1);
         let mut snapshot = crate::http::canned::snapshot();
         snapshot.links[0].endpoint = format!("serial:{}:57600", gimbal.path.display());
         snapshot.links[0].peers[0].components = vec!["1/154".to_owned()];
@@ -499,8 +499,6 @@ mod tests {
             write!(client, "HTTP/1.1 200 OK\r\nContent-Length: {}\r\n\r\n{body}", body.len()).expect("it listens");
         });
 
-        // An open far end would hide that somebody else opens and closes it.
-        gimbal.far = None;
         let (result, output, errors) = gimbal.scan(&gimbal.path, &daemon);
 
         server.join().expect("no panic");

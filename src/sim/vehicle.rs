@@ -2,7 +2,7 @@
 //!
 //! It sends what PX4 or ArduPilot sends at similar rates, and answers what a ground station asks before it shows a
 //! vehicle: version, parameters, mission, fence and rally points. It drives no gimbal unless it is told to, as ArduPilot
-//! drives a gimbal device ([`mount`]), or as PX4 asks a gimbal manager ([`manager_client`]).
+//! drives a gimbal device (`mount`), or as PX4 asks a gimbal manager (`manager_client`).
 
 mod answers;
 mod flight;

@@ -1,8 +1,8 @@
 //! The conversation with a Gremsy: it is got to know, then steered in the generation of its protocol that it speaks.
 //!
 //! Follows the vendor's gSDK: who it is and its parameters are asked for, then it is waited for until everything in it is
-//! in place; only then is it known to whoever steers. What it is told in v1 is in [`mount`]; in v2 it is a gimbal device of
-//! the Gimbal Protocol, which the driver for those takes care of, with modes of the vendor's own ([`mode_change`]).
+//! in place; only then is it known to whoever steers. What it is told in v1 is in `mount`; in v2 it is a gimbal device of
+//! the Gimbal Protocol, which the driver for those takes care of, with modes of the vendor's own (`mode_change`).
 
 mod details;
 mod effect;
