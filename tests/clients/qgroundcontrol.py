@@ -526,8 +526,12 @@ def with_snooping(steps):
 def with_another_gimbal(steps, gimbal):
     """What its operator does does not depend on the gimbal, but for what that can do."""
     with Rig("qgroundcontrol", settings=SNOOP, gimbal=gimbal) as rig:
-        modern(steps, rig, NEWEST)
-        points(steps, rig, NEWEST, is_obeyed=True)
+        for generation in (LINE_2024, EARLY_2026, NEWEST):
+            modern(steps, rig, generation)
+        for generation in (LINE_2024, EARLY_2026, NEWEST):
+            points(steps, rig, generation, is_obeyed=True)
+        if rig.kind.tells_retract:
+            first_4_4(steps, rig, is_obeyed=True)
         qt5(steps, rig, is_obeyed=True)
 
 
