@@ -3,7 +3,7 @@
 pub mod order;
 
 use std::ffi::OsString;
-use std::net::SocketAddr;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -15,6 +15,9 @@ use crate::exit_code::ExitCode;
 use crate::gimbals::gremsy::parameters::RcType;
 use crate::gimbals::gremsy::version::FirmwareVersion;
 use crate::sim::faults::WORDS;
+
+/// One more than where QGroundControl listens.
+const DEMO_CLIENT: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 14551);
 
 const ENDPOINTS: &str = "\
 Endpoints:
@@ -79,6 +82,7 @@ Exit codes: 0 when all is right, 78 when not.")]
 Examples:
   gimbald demo                                   then open http://127.0.0.1:8080 and QGroundControl
   gimbald demo --ground udpbcast:192.168.1.255:14550
+  gimbald demo --http 127.0.0.1:8081 --client 127.0.0.1:14561     beside another one
   gimbald demo --duration 10
   gimbald demo --family gremsy --gremsy-generation v1
 
@@ -94,9 +98,10 @@ Examples:
 Examples:
   gimbald status
   gimbald status --watch
+  gimbald status --config ./gimbald.toml         of the daemon that runs with it
   gimbald status --url http://192.168.1.10:8080 --json
 
-Exit codes: 0 when the daemon answered, 69 when not.")]
+Exit codes: 0 when the daemon answered, 69 when not, 64 for a URL and 78 for a configuration that cannot be read.")]
     Status(StatusArgs),
 
     /// Show a gimbal by its name, or ask something of it
@@ -121,7 +126,7 @@ GIMBALD__HTTP__TOKEN_FILE or the configuration names. Whoever asks takes part in
 for lease_timeout_s loses it. What can cost the camera or the flight (motors off, reboot, shutdown) needs its --yes-… and
 control, taken before.
 Exit codes: 0 done, 64 wrong arguments or no such gimbal, 69 the daemon or the gimbal is not there or cannot, 77 no token, a
-wrong one, or somebody else is in control, 78 the token file holds no token."
+wrong one, or somebody else is in control, 78 the configuration cannot be read, or the token file holds no token."
     )]
     Gimbal(GimbalArgs),
 
@@ -137,7 +142,8 @@ may be silent until it hears somebody, so HEARTBEAT is sent (from system 1, comp
 a vehicle of no kind, in turn), whoever was heard is asked for GIMBAL_DEVICE_INFORMATION, gimbals that do not answer for
 parameters of certain makes, and a Gremsy for GIMBAL_DEVICE_ATTITUDE_STATUS ten times a second. Nothing is sent that
 moves anything.
-Exit codes: 0 when something answered, 69 when not, 64 for a DEVICE that is no serial port.")]
+Exit codes: 0 when something answered, 69 when not, 64 for a DEVICE that is no serial port, 78 for a configuration that
+cannot be read.")]
     Scan(ScanArgs),
 }
 
@@ -157,6 +163,10 @@ pub struct DemoArgs {
     /// Where to show the page
     #[arg(long, value_name = "ADDR:PORT", default_value_t = HttpSettings::DEFAULT_LISTEN)]
     pub http: SocketAddr,
+
+    /// Where a second client, such as MAVSDK or MAVProxy, may connect over UDP
+    #[arg(long, value_name = "ADDR:PORT", default_value_t = DEMO_CLIENT)]
+    pub client: SocketAddr,
 
     /// What kind of gimbal to simulate
     #[arg(long, value_name = "FAMILY", value_enum, default_value_t = SimulatedFamily::MavlinkV2)]
@@ -314,11 +324,22 @@ pub struct SimVehicleArgs {
     pub no_autopilot_state: bool,
 }
 
+/// Which running daemon is asked.
+#[derive(Clone, Debug, Default, Args)]
+pub struct DaemonArgs {
+    /// Where the daemon's page is; without it, where GIMBALD__HTTP__LISTEN or the configuration has it
+    #[arg(long, global = true, display_order = 100, value_name = "URL")]
+    pub url: Option<String>,
+
+    /// The daemon's configuration [default: /etc/gimbald/gimbald.toml]
+    #[arg(long, global = true, display_order = 100, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+}
+
 #[derive(Debug, Args)]
 pub struct StatusArgs {
-    /// Where the daemon's page is
-    #[arg(long, value_name = "URL", default_value_t = format!("http://{}", HttpSettings::DEFAULT_LISTEN))]
-    pub url: String,
+    #[command(flatten)]
+    pub daemon: DaemonArgs,
 
     /// Print again whenever something changes, until Ctrl-C
     #[arg(long)]
@@ -335,17 +356,13 @@ pub struct GimbalArgs {
     #[arg(value_name = "NAME")]
     pub name: Option<String>,
 
-    /// Where the daemon's page is; without it, where GIMBALD__HTTP__LISTEN or the configuration has it
-    #[arg(long, global = true, display_order = 100, value_name = "URL")]
-    pub url: Option<String>,
+    #[command(flatten)]
+    pub daemon: DaemonArgs,
 
-    /// The file with the token of those who may control gimbals
+    /// The file with the token of those who may control gimbals; without it, the one that GIMBALD__HTTP__TOKEN_FILE or the
+    /// configuration names
     #[arg(long, global = true, display_order = 100, value_name = "FILE")]
     pub token_file: Option<PathBuf>,
-
-    /// The configuration that names both otherwise
-    #[arg(long, global = true, display_order = 100, value_name = "FILE", default_value = DEFAULT_FILE)]
-    pub config: PathBuf,
 
     /// Print the daemon's JSON as it is
     #[arg(long, global = true, display_order = 100)]
@@ -361,9 +378,9 @@ pub struct ScanArgs {
     #[arg(value_name = "DEVICE")]
     pub device: Option<PathBuf>,
 
-    /// Where the page of a running daemon is, which is asked first
-    #[arg(long, value_name = "URL", default_value_t = format!("http://{}", HttpSettings::DEFAULT_LISTEN))]
-    pub url: String,
+    /// Asked first.
+    #[command(flatten)]
+    pub daemon: DaemonArgs,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -519,10 +536,11 @@ mod tests {
         let Ok(Cli { command: Command::Demo(demo), .. }) = read("gimbald demo") else { panic!("demo") };
         assert_eq!(demo.ground.to_string(), "udpout:127.0.0.1:14550");
         assert_eq!(demo.http.to_string(), "127.0.0.1:8080");
+        assert_eq!(demo.client.to_string(), "127.0.0.1:14551");
         assert_eq!(demo.duration, None);
 
         let Ok(Cli { command: Command::Status(status), .. }) = read("gimbald status") else { panic!("status") };
-        assert_eq!(status.url, "http://127.0.0.1:8080");
+        assert_eq!((status.daemon.url, status.daemon.config), (None, None));
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 pub mod check;
 mod client;
+mod daemon_address;
 pub mod demo;
 pub mod gimbal;
 pub mod run;

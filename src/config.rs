@@ -19,7 +19,7 @@ mod suggestion;
 use std::path::{Path, PathBuf};
 
 use problem::Problems;
-use settings::DaemonSettings;
+use settings::{DaemonSettings, WindowSettings};
 
 /// Where the configuration is looked for when the command line names no other file.
 pub const DEFAULT_FILE: &str = "/etc/gimbald/gimbald.toml";
@@ -51,6 +51,29 @@ pub fn load(path: &Path, environment: impl Iterator<Item = (String, String)>) ->
     let configuration = schema::read(root, &mut problems);
     let token = checks::check(&configuration, &mut problems);
     if problems.is_empty() { Ok(settings::build(configuration, token, directories)) } else { Err(in_file(problems)) }
+}
+
+/// Where the window of the daemon with this configuration is, for those who ask it something.
+///
+/// Only `[http]` must be right. Without `path` it is the usual file, which need not be there, nor be ours to read.
+pub fn load_window(
+    path: Option<&Path>,
+    environment: impl Iterator<Item = (String, String)>,
+) -> Result<WindowSettings, Problems> {
+    let file = path.unwrap_or(Path::new(DEFAULT_FILE));
+    let in_file = |list| Problems::new(file.to_owned(), list);
+    let mut root = match (file::read(file).and_then(|text| document::parse(&text)), path) {
+        (Ok(root), _) => root,
+        (Err(problem), Some(_)) => return Err(in_file(vec![problem])),
+        // `gimbald check` says what is wrong with it.
+        (Err(_), None) => document::Table::new(),
+    };
+    let overrides = environment.filter(|(name, _)| name.starts_with(environment::PREFIX)).collect();
+    let mut problems = Vec::new();
+    environment::apply(&mut root, overrides, &mut problems);
+    let http = schema::read(root, &mut problems).http;
+    problems.retain(|problem| problem.key == "http" || problem.key.starts_with("http."));
+    if problems.is_empty() { Ok(settings::window(http)) } else { Err(in_file(problems)) }
 }
 
 /// The variables of this process; bytes that are no UTF-8 become U+FFFD, which no setting accepts.

@@ -271,7 +271,7 @@ mod tests {
     fn options_may_follow_the_command() {
         let arguments = read("stop --json --url http://drone:8080 --token-file t").expect("right");
         assert_eq!(
-            (arguments.name.as_deref(), arguments.json, arguments.url.as_deref()),
+            (arguments.name.as_deref(), arguments.json, arguments.daemon.url.as_deref()),
             (Some("camera"), true, Some("http://drone:8080"))
         );
         let arguments = read("--json").expect("right");

@@ -11,6 +11,7 @@ use serde_json::Value;
 use tokio::net::TcpStream;
 use tokio::time::timeout;
 
+use crate::config::problem::Problems;
 use crate::exit_code::ExitCode;
 use crate::token::Token;
 
@@ -29,9 +30,11 @@ const ANSWER_BYTES: usize = 1024 * 1024;
 pub enum ClientError {
     #[error("{0:?} is not an address that can be asked: expected http://HOST:PORT, for example http://127.0.0.1:8080")]
     Url(String),
+    #[error("{0}")]
+    Config(#[source] Problems),
     #[error(
         "no gimbald answers at {url} ({source}): is it running (systemctl status gimbald), \
-         and is [http] listen that address? Otherwise name it with --url"
+         and is [http] listen that address? Otherwise name it with --url, or its configuration with --config"
     )]
     Unreachable { url: String, source: io::Error },
     #[error("{url} did not answer within {} s: is it gimbald, and can it be reached?", .within.as_secs())]
@@ -45,11 +48,12 @@ pub enum ClientError {
 }
 
 impl ClientError {
-    /// As in sysexits: 64 for a wrong argument, 77 for what must be allowed first, 69 for a daemon or a gimbal that is not
+    /// As in sysexits: 64 for a wrong argument, 78 for a wrong configuration, 77 for what must be allowed first, 69 for a daemon or a gimbal that is not
     /// there or cannot.
     pub fn exit_code(&self) -> ExitCode {
         match self {
             Self::Url(_) => ExitCode::Usage,
+            Self::Config(_) => ExitCode::Config,
             Self::Refused { status, .. } => match *status {
                 StatusCode::BAD_REQUEST | StatusCode::NOT_FOUND | StatusCode::UNPROCESSABLE_ENTITY => ExitCode::Usage,
                 StatusCode::UNAUTHORIZED | StatusCode::FORBIDDEN | StatusCode::CONFLICT => ExitCode::NoPermission,

@@ -16,6 +16,7 @@ use tokio::sync::oneshot;
 
 use crate::bridge::settings::{Role, Settings};
 use crate::cli::{DemoArgs, SimulatedFamily};
+use crate::commands::daemon_address::from_here;
 use crate::commands::sim::{NoSuchGremsy, gremsy_settings};
 use crate::config::settings::{DaemonSettings, Directories, HttpSettings, link_on};
 use crate::daemon::clock::unix_time_us;
@@ -33,9 +34,6 @@ use crate::sim::vehicle::{Vehicle, VehicleSettings};
 use crate::timestamp::Timestamp;
 use crate::token::Token;
 
-/// Where a second client may connect.
-const CLIENT: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 14551);
-
 const GIMBAL_BAUD: u32 = 115_200;
 
 /// Why there is no demo.
@@ -47,8 +45,14 @@ enum DemoError {
         #[source]
         cause: io::Error,
     },
-    #[error("UDP port {CLIENT}, where a second client connects, is taken (does another demo run?)")]
-    Client(#[source] io::Error),
+    #[error(
+        "a second client cannot connect at UDP {address} (does another demo run?); name another place with --client"
+    )]
+    Client {
+        address: SocketAddr,
+        #[source]
+        cause: io::Error,
+    },
     #[error(transparent)]
     Gimbal(#[from] NoSuchGremsy),
     #[error("no pseudo-terminal for the gimbal")]
@@ -84,7 +88,7 @@ pub fn demo(arguments: &DemoArgs, output: &mut impl Write, errors: &mut impl Wri
 fn run(arguments: &DemoArgs, output: &mut impl Write) -> Result<(), DemoError> {
     // Without them the instructions would lead to somebody else's daemon.
     TcpListener::bind(arguments.http).map_err(|cause| DemoError::Page { address: arguments.http, cause })?;
-    UdpSocket::bind(CLIENT).map_err(DemoError::Client)?;
+    UdpSocket::bind(arguments.client).map_err(|cause| DemoError::Client { address: arguments.client, cause })?;
     let cable = Pty::open().map_err(DemoError::Pty)?;
     let path = cable.path().map_err(DemoError::Pty)?.to_string_lossy().into_owned();
     let autopilot = free_port().map_err(DemoError::Port)?;
@@ -127,7 +131,7 @@ fn daemon_settings(arguments: &DemoArgs, gimbal: Endpoint, autopilot: SocketAddr
         ("gimbal", Role::Gimbal, gimbal),
         ("autopilot", Role::Autopilot, Endpoint::UdpIn(autopilot)),
         ("ground", Role::Ground, arguments.ground.clone()),
-        ("client", Role::Ground, Endpoint::UdpIn(CLIENT)),
+        ("client", Role::Ground, Endpoint::UdpIn(arguments.client)),
     ];
     let links = all.iter().map(|(name, role, endpoint)| link_on((*name).to_owned(), *role, endpoint)).collect();
     let gimbals = match arguments.family {
@@ -148,18 +152,19 @@ fn daemon_settings(arguments: &DemoArgs, gimbal: Endpoint, autopilot: SocketAddr
 
 fn instructions(arguments: &DemoArgs, settings: &DaemonSettings, token_file: &Path) -> String {
     let name = settings.core.gimbals.first().map_or("gimbal-154", |gimbal| gimbal.name.as_str());
+    let (page, client) = (from_here(arguments.http), from_here(arguments.client));
     // A configuration that is installed here may have its page elsewhere.
-    let url = format!(" --url http://{}", arguments.http);
+    let url = format!(" --url http://{page}");
     let listed: Vec<_> =
         settings.core.links.iter().map(|link| format!("    {:<10} {}", link.name, link.endpoint)).collect();
     format!(
         "\
 gimbald demo: a simulated vehicle and gimbal, and the daemon between them
 
-  Page             http://{}
+  Page             http://{page}
   QGroundControl   start it; the vehicle appears by itself ({})
-  MAVSDK           connection udpout://{CLIENT}
-  MAVProxy         mavproxy.py --master=udpout:{CLIENT}, then: module load camera; camera set manager_component 191
+  MAVSDK           connection udpout://{client}
+  MAVProxy         mavproxy.py --master=udpout:{client}, then: module load camera; camera set manager_component 191
   Command line     gimbald gimbal {name} point --pitch-deg -30 --token-file {}{url}
 
   Links
@@ -167,7 +172,6 @@ gimbald demo: a simulated vehicle and gimbal, and the daemon between them
 
 Ctrl-C ends it.
 ",
-        arguments.http,
         arguments.ground,
         token_file.display(),
         listed.join("\n"),

@@ -2,8 +2,7 @@
 
 use std::future::poll_fn;
 use std::io::{self, Write};
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::task::Poll;
 use std::time::Duration;
 
@@ -12,23 +11,18 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::time::{Instant, sleep_until};
 
 use super::client::{ClientError, Target, printable, printable_text};
+use super::daemon_address;
 use super::status::text;
 use crate::actions::percent_encoded;
 use crate::bridge::snapshot::GimbalSnapshot;
 use crate::cli::GimbalArgs;
 use crate::cli::order::{Act, Order};
-use crate::config::settings::HttpSettings;
+use crate::config::DEFAULT_FILE;
 use crate::exit_code::ExitCode;
 use crate::token::{Token, TokenError};
 
 /// Between two requests to turn on; well below the shortest sensible `rate_timeout_s`.
 const REFRESH: Duration = Duration::from_millis(400);
-
-/// Says where the token is, as the daemon's own variable does.
-const TOKEN_VARIABLE: &str = "GIMBALD__HTTP__TOKEN_FILE";
-
-/// The same for the page.
-const LISTEN_VARIABLE: &str = "GIMBALD__HTTP__LISTEN";
 
 /// Why it could not be shown, or was not done.
 #[derive(Debug, thiserror::Error)]
@@ -76,7 +70,7 @@ pub fn gimbal(arguments: &GimbalArgs, output: &mut impl Write, errors: &mut impl
 }
 
 fn run(arguments: &GimbalArgs, output: &mut impl Write) -> Result<(), GimbalError> {
-    let target = Target::parse(&url(arguments))?;
+    let target = daemon_address::target(&arguments.daemon)?;
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(ClientError::Output)?;
     let result = runtime.block_on(async {
         let Some(name) = &arguments.name else {
@@ -222,69 +216,19 @@ fn as_it_is(answer: &[u8]) -> String {
     format!("{}\n", String::from_utf8_lossy(answer))
 }
 
-/// Where the page is: as it is said, or as the configuration says, or where it is without one.
-fn url(arguments: &GimbalArgs) -> String {
-    let from_variable = || std::env::var(LISTEN_VARIABLE).ok(); // none set, or none that is an address
-    let listen = || from_variable().or_else(|| configured(&arguments.config, "listen"));
-    let configured = || listen().and_then(|listen| listen.parse().ok()); // `gimbald check` says what is wrong with it
-    arguments.url.clone().unwrap_or_else(|| {
-        let mut listen: SocketAddr = configured().unwrap_or(HttpSettings::DEFAULT_LISTEN);
-        // A port of every address is one of this computer's own.
-        match listen.ip() {
-            IpAddr::V4(ip) if ip.is_unspecified() => listen.set_ip(Ipv4Addr::LOCALHOST.into()),
-            IpAddr::V6(ip) if ip.is_unspecified() => listen.set_ip(Ipv6Addr::LOCALHOST.into()),
-            IpAddr::V4(_) | IpAddr::V6(_) => {}
-        }
-        format!("http://{listen}")
-    })
-}
-
 fn token(arguments: &GimbalArgs) -> Result<Token, GimbalError> {
-    let from_variable = || std::env::var_os(TOKEN_VARIABLE).map(PathBuf::from);
-    let path = arguments
-        .token_file
-        .clone()
-        .or_else(from_variable)
-        .or_else(|| configured(&arguments.config, "token_file").map(PathBuf::from));
-    let path = path.ok_or_else(|| GimbalError::NoToken(arguments.config.clone()))?;
+    let path = match &arguments.token_file {
+        Some(path) => path.clone(),
+        None => daemon_address::settings(&arguments.daemon)?.token_file.ok_or_else(|| {
+            GimbalError::NoToken(arguments.daemon.config.clone().unwrap_or_else(|| DEFAULT_FILE.into()))
+        })?,
+    };
     Token::read(&path).map_err(|error| GimbalError::Token { path, error })
-}
-
-/// What the configuration says in `[http]`; whether the rest of it is right is not asked here.
-fn configured(path: &Path, key: &str) -> Option<String> {
-    let text = std::fs::read_to_string(path).ok()?; // none there, or none for us
-    let table: toml::Table = text.parse().ok()?; // `gimbald check` says what is wrong with it
-    table.get("http")?.get(key)?.as_str().map(str::to_owned)
 }
 
 #[cfg(test)]
 mod tests {
-    use clap::Parser;
-
     use super::*;
-    use crate::cli::{Cli, Command};
-
-    /// The page is looked for where the configuration that is named has it, on this computer.
-    #[test]
-    fn the_configuration_says_where_the_page_is() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let file = folder.path().join("gimbald.toml");
-        for (text, options, expected) in [
-            ("[http]\nlisten = \"127.0.0.1:9090\"\n", &[][..], "http://127.0.0.1:9090"),
-            ("[http]\nlisten = \"0.0.0.0:9090\"\n", &[], "http://127.0.0.1:9090"),
-            ("[http]\nlisten = \"[::]:9090\"\n", &[], "http://[::1]:9090"),
-            ("[http]\n", &[], "http://127.0.0.1:8080"),
-            ("[http]\nlisten = \"127.0.0.1:9090\"\n", &["--url", "http://drone:80"], "http://drone:80"),
-        ] {
-            std::fs::write(&file, text).expect("a writable folder");
-            let config = file.to_str().expect("UTF-8");
-            let line = [&["gimbald", "gimbal", "camera", "--config", config], options].concat();
-            let Ok(Cli { command: Command::Gimbal(arguments), .. }) = Cli::try_parse_from(line) else {
-                panic!("right")
-            };
-            assert_eq!(url(&arguments), expected, "{text} {options:?}");
-        }
-    }
 
     #[test]
     fn who_may_not_read_the_token_is_told_what_to_do() {

@@ -14,7 +14,8 @@ use tokio_serial::{ClearBuffer, SerialPort, SerialStream};
 
 use self::conversation::{Conversation, Party};
 use self::ports::{Port, PortError};
-use super::client::{ClientError, printable_text};
+use super::client::{ClientError, Target, printable_text};
+use super::daemon_address;
 use super::status;
 use crate::bridge::settings::Role;
 use crate::bridge::snapshot::{GimbalSnapshot, LinkSnapshot};
@@ -39,6 +40,8 @@ enum ScanError {
     NoPorts,
     #[error("nothing answered")]
     NothingAnswered,
+    #[error(transparent)]
+    Daemon(#[from] ClientError),
     #[error("the scan could not be started: {0}")]
     Runtime(#[source] io::Error),
 }
@@ -47,6 +50,7 @@ impl ScanError {
     fn exit_code(&self) -> ExitCode {
         match self {
             Self::NotASerialPort(_) => ExitCode::Usage,
+            Self::Daemon(error) => error.exit_code(),
             Self::NoSuchPort { .. } | Self::NoPorts | Self::NothingAnswered | Self::Runtime(_) => ExitCode::Unavailable,
         }
     }
@@ -54,7 +58,8 @@ impl ScanError {
 
 /// Tries the ports one after the other; findings go to `output`, progress and problems to `errors`.
 pub fn scan(arguments: &ScanArgs, output: &mut impl Write, errors: &mut impl Write) -> ExitCode {
-    match run(arguments.device.as_deref(), &arguments.url, output, errors) {
+    let daemon = daemon_address::target(&arguments.daemon).map_err(ScanError::Daemon);
+    match daemon.and_then(|daemon| run(arguments.device.as_deref(), &daemon, output, errors)) {
         Ok(()) => ExitCode::Ok,
         Err(error) => {
             say(errors, format_args!("gimbald scan: {error}"));
@@ -63,7 +68,12 @@ pub fn scan(arguments: &ScanArgs, output: &mut impl Write, errors: &mut impl Wri
     }
 }
 
-fn run(device: Option<&Path>, daemon: &str, output: &mut impl Write, errors: &mut impl Write) -> Result<(), ScanError> {
+fn run(
+    device: Option<&Path>,
+    daemon: &Target,
+    output: &mut impl Write,
+    errors: &mut impl Write,
+) -> Result<(), ScanError> {
     let ports = match device {
         Some(path) => {
             vec![Port::at(path).map_err(|cause| ScanError::NoSuchPort { path: path.to_owned(), cause })?]
@@ -104,8 +114,8 @@ fn run(device: Option<&Path>, daemon: &str, output: &mut impl Write, errors: &mu
 }
 
 /// The daemon's serial links, whose ports it opens again whenever they are free.
-async fn held_by_daemon(url: &str, errors: &mut impl Write) -> Vec<Held> {
-    match status::snapshot(url).await {
+async fn held_by_daemon(daemon: &Target, errors: &mut impl Write) -> Vec<Held> {
+    match status::snapshot(daemon).await {
         Ok(snapshot) => snapshot.links.iter().filter_map(|link| Held::of_link(link, &snapshot.gimbals)).collect(),
         Err(ClientError::Unreachable { .. }) => Vec::new(),
         Err(error) => {
@@ -380,7 +390,7 @@ mod tests {
         }
 
         /// Scans the port under the name `path`: what came of it, what was found, what was said.
-        fn scan(&self, path: &Path, daemon: &str) -> (Result<(), ScanError>, String, String) {
+        fn scan(&self, path: &Path, daemon: &Target) -> (Result<(), ScanError>, String, String) {
             let mut output = Vec::new();
             let result = run(Some(path), daemon, &mut output, &mut self.said.clone());
             (result, String::from_utf8(output).expect("text"), self.said.text())
@@ -420,17 +430,17 @@ mod tests {
     }
 
     /// A port where nobody listens, and that nobody else can get while the tests run.
-    fn no_daemon() -> String {
+    fn no_daemon() -> Target {
         static TAKEN: LazyLock<Socket> = LazyLock::new(|| {
             let socket = Socket::new(Domain::IPV4, Type::STREAM, None).expect("a socket");
             socket.bind(&SocketAddr::from((Ipv4Addr::LOCALHOST, 0)).into()).expect("a free port");
             socket
         });
         let address = TAKEN.local_addr().expect("it is bound").as_socket().expect("of IP");
-        format!("http://{address}")
+        Target::parse(&format!("http://{address}")).expect("right")
     }
 
-    fn scan_at(path: &Path, daemon: &str) -> (Result<(), ScanError>, String, String) {
+    fn scan_at(path: &Path, daemon: &Target) -> (Result<(), ScanError>, String, String) {
         let (mut output, mut errors) = (Vec::new(), Vec::new());
         let result = run(Some(path), daemon, &mut output, &mut errors);
         let text = |bytes| String::from_utf8(bytes).expect("text");
@@ -488,6 +498,7 @@ mod tests {
         let body = serde_json::to_string(&snapshot).expect("JSON");
         let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
         let daemon = format!("http://{}", listener.local_addr().expect("it is bound"));
+        let daemon = Target::parse(&daemon).expect("right");
         let server = std::thread::spawn(move || {
             let (mut client, _) = listener.accept().expect("a client");
             let mut asked = Vec::new();

@@ -10,6 +10,7 @@ use serde_json::Value;
 use tokio::time::sleep;
 
 use super::client::{ClientError, Target, printable};
+use super::daemon_address;
 use crate::bridge::snapshot::Snapshot;
 use crate::cli::StatusArgs;
 use crate::exit_code::ExitCode;
@@ -17,6 +18,7 @@ use crate::exit_code::ExitCode;
 /// Below `/api/v1`.
 const STATUS_PATH: &str = "/status";
 const REDRAW: Duration = Duration::from_secs(1);
+
 /// Prints the status, and to `errors` why it could not.
 pub fn status(arguments: &StatusArgs, errors: &mut impl Write) -> ExitCode {
     match run(arguments) {
@@ -29,16 +31,15 @@ pub fn status(arguments: &StatusArgs, errors: &mut impl Write) -> ExitCode {
     }
 }
 
-/// What the daemon at `url` tells.
-pub(super) async fn snapshot(url: &str) -> Result<Snapshot, ClientError> {
-    let target = Target::parse(url)?;
-    let answer = fetch(&target).await?;
+/// What the daemon at `target` tells.
+pub(super) async fn snapshot(target: &Target) -> Result<Snapshot, ClientError> {
+    let answer = fetch(target).await?;
     serde_json::from_slice(&answer).map_err(|error| target.not_gimbald(error))
 }
 
 /// Prints the status once, or until Ctrl-C; while watching, a daemon that does not answer is shown and asked again.
 fn run(options: &StatusArgs) -> Result<(), ClientError> {
-    let target = Target::parse(&options.url)?;
+    let target = daemon_address::target(&options.daemon)?;
     let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build();
     let runtime = runtime.map_err(ClientError::Output)?;
     let result = runtime.block_on(async {
@@ -109,6 +110,7 @@ mod tests {
 
     use super::super::client::READING;
     use super::*;
+    use crate::cli::DaemonArgs;
     use crate::http::canned;
 
     #[test]
@@ -146,7 +148,9 @@ mod tests {
         let text = error.to_string();
         assert_eq!(error.exit_code(), ExitCode::Unavailable);
         assert!(text.starts_with(&format!("no gimbald answers at http://{address} (")), "{text}");
-        assert!(text.contains("systemctl status gimbald") && text.contains("--url"), "{text}");
+        for remedy in ["systemctl status gimbald", "--url", "--config"] {
+            assert!(text.contains(remedy), "{text}");
+        }
     }
 
     #[test]
@@ -212,7 +216,8 @@ mod tests {
     }
 
     fn options(address: SocketAddr) -> StatusArgs {
-        StatusArgs { url: format!("http://{address}"), watch: false, json: false }
+        let daemon = DaemonArgs { url: Some(format!("http://{address}")), config: None };
+        StatusArgs { daemon, watch: false, json: false }
     }
 
     /// Gives one client `answer`; ends with what it asked.

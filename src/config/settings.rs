@@ -47,6 +47,14 @@ impl HttpSettings {
     pub const DEFAULT_LISTEN: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 8080);
 }
 
+/// What those who ask a running daemon something need of its configuration.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct WindowSettings {
+    pub listen: SocketAddr,
+    /// Who can read it may control gimbals.
+    pub token_file: Option<PathBuf>,
+}
+
 /// Turns a configuration without problems into settings; unset keys get their defaults here.
 pub(super) fn build(configuration: Configuration, token: Option<Token>, directories: Directories) -> DaemonSettings {
     let Configuration { vehicle, links, gimbals, autopilot, control, roi, http } = configuration;
@@ -144,6 +152,13 @@ fn control(control: Control, roi: Roi) -> ControlSettings {
         px4_release_quirk: value_or(control.px4_release_quirk, default.px4_release_quirk),
         synthesize_286: value_or(control.synthesize_286, default.synthesize_286),
         roi_altitude: value_or(roi.altitude_reference, default.roi_altitude),
+    }
+}
+
+pub(super) fn window(http: Http) -> WindowSettings {
+    WindowSettings {
+        listen: value_or(http.listen, HttpSettings::DEFAULT_LISTEN),
+        token_file: http.token_file.map(|file| file.value),
     }
 }
 

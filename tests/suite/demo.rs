@@ -17,11 +17,8 @@ use gimbald::wire::dialect::{
 use gimbald::wire::ids::{command, message};
 
 use self::client::{Client, frame, frames_of, status};
-use self::process::{Process, free_tcp, free_udp, require_free_udp};
+use self::process::{Process, free_tcp, free_udp};
 use crate::support::world::{AUTOPILOT, GCS, GIMBAL, MANAGER};
-
-/// "mavproxy.py --master=udpout:127.0.0.1:14551": where a second client connects is part of the demo's instructions.
-const CLIENT: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(std::net::Ipv4Addr::LOCALHOST), 14551);
 
 const ACCEPTED: u8 = 0;
 /// "Command is valid, but cannot be executed at this time … Retrying later should work".
@@ -40,23 +37,24 @@ const GOODBYE: Duration = Duration::from_secs(3);
 /// pseudo-terminal and real UDP, the real daemon between them".
 #[test]
 fn a_client_of_the_demo_steers_the_gimbal() {
-    require_free_udp(CLIENT);
-    let page = free_tcp();
+    let (page, second) = (free_tcp(), free_udp());
     let ground = Listener::start();
     let ground_endpoint = format!("udpout:{}", ground.address);
-    let (http, duration) = (page.to_string(), "9");
+    let (http, second_client, duration) = (page.to_string(), second.to_string(), "9");
     let demo = Process::start(&[
         "demo",
         "--http",
         &http,
         "--ground",
         &ground_endpoint,
+        "--client",
+        &second_client,
         "--duration",
         duration,
         "--log",
         "warn",
     ]);
-    let mut client = Client::new(CLIENT);
+    let mut client = Client::new(second);
 
     meet_manager(&mut client);
 
@@ -78,7 +76,8 @@ fn a_client_of_the_demo_steers_the_gimbal() {
     let outcome = demo.end(Duration::from_secs(9) + GOODBYE);
     assert_eq!((outcome.code, outcome.errors.as_str()), (Some(0), ""));
     assert!(outcome.output.contains(&format!("http://{http}")), "{}", outcome.output);
-    assert!(outcome.output.contains("--master=udpout:127.0.0.1:14551,"), "{}", outcome.output);
+    // "mavproxy.py --master=udpout:…": where a second client connects is part of the demo's instructions.
+    assert!(outcome.output.contains(&format!("--master=udpout:{second},")), "{}", outcome.output);
     let control = "gimbald gimbal gimbal-154 point --pitch-deg -30 --token-file ";
     let (_, rest) = outcome.output.split_once(control).unwrap_or_else(|| panic!("{}", outcome.output));
     let (token_file, rest) = rest.split_once(' ').expect("the page is not where it usually is");

@@ -22,7 +22,7 @@ pub struct Port {
 }
 
 /// A running gimbald is asked at its page, which may be elsewhere.
-const ASK_IT: &str = "; if it is the service, name its page with --url, and it is asked what is there";
+const ASK_IT: &str = "; if it is the service, name its page with --url or its configuration with --config, and it is asked what is there";
 
 /// Why a port is not tried.
 #[derive(Debug, thiserror::Error)]
@@ -228,7 +228,7 @@ mod tests {
         assert_eq!(told("minicom"), "in use by minicom (process 7)");
         assert_eq!(
             told("gimbald"),
-            "in use by gimbald (process 7); if it is the service, name its page with --url, and it is asked what is there"
+            "in use by gimbald (process 7); if it is the service, name its page with --url or its configuration with --config, and it is asked what is there"
         );
     }
 }
