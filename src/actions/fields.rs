@@ -147,6 +147,12 @@ impl Values {
         self.find(name)?.as_str()
     }
 
+    /// Which of `words` it is.
+    pub fn index(&self, name: &str, words: &[&str]) -> Option<usize> {
+        let given = self.word(name)?;
+        words.iter().position(|word| *word == given)
+    }
+
     pub fn flag(&self, name: &str) -> Option<bool> {
         self.find(name)?.as_bool()
     }

@@ -11,6 +11,19 @@ use crate::manager::asked::Asked;
 use crate::manager::request::AxisDemand;
 use crate::manager::roi::Datum;
 
+/// The names of all values of a kind, in their order.
+macro_rules! words {
+    ($kind:ty) => {{
+        let mut words = [""; <$kind>::ALL.len()];
+        let mut at = 0;
+        while at < words.len() {
+            words[at] = <$kind>::ALL[at].name();
+            at += 1;
+        }
+        words
+    }};
+}
+
 /// Everything that can be asked.
 pub const ACTIONS: &[Action] = &[
     Action {
@@ -139,13 +152,8 @@ pub const ACTIONS: &[Action] = &[
         )],
         word: None,
         read: |values| {
-            operation(Operation::Reset(match values.word("mode") {
-                Some("yaw") => ResetMode::Yaw,
-                Some("pitch_down_up_and_yaw") => ResetMode::PitchDownUpAndYaw,
-                Some("pitch_down_up") => ResetMode::PitchDownUp,
-                Some("pitch_mapping") => ResetMode::PitchMapping,
-                _ => ResetMode::PitchAndYaw,
-            }))
+            let mode = values.index("mode", &RESET_MODES).map(|at| ResetMode::ALL[at]);
+            operation(Operation::Reset(mode.unwrap_or(ResetMode::PitchAndYaw)))
         },
     },
     plain(
@@ -161,8 +169,8 @@ pub const ACTIONS: &[Action] = &[
         fields: &[word("type", "the kind of receiver", &RADIO_TYPES)],
         word: None,
         read: |values| {
-            let index = RADIO_TYPES.iter().position(|name| values.word("type") == Some(*name)).unwrap_or_default();
-            operation(Operation::SetRadioType(RADIO_TYPE_VALUES[index]))
+            let kind = values.index("type", &RADIO_TYPES).map(|at| RadioType::ALL[at]);
+            operation(Operation::SetRadioType(kind.unwrap_or(RadioType::Sync)))
         },
     },
     plain("information", "information", "Ask the gimbal once more who it is", |_| {
@@ -173,11 +181,7 @@ pub const ACTIONS: &[Action] = &[
         command: "stream-rate",
         about: "Set how often the gimbal sends one of its messages",
         fields: &[
-            word(
-                "stream",
-                "the message; a v1 Gremsy does not send attitude_status",
-                &["encoders", "mount_orientation", "attitude_status", "raw_imu"],
-            ),
+            word("stream", "the message; a v1 Gremsy does not send attitude_status", &STREAMS),
             required(Field {
                 name: "rate_hz",
                 about: "times a second; default is as often as the gimbal does by itself",
@@ -187,12 +191,7 @@ pub const ACTIONS: &[Action] = &[
         ],
         word: None,
         read: |values| {
-            let stream = match values.word("stream") {
-                Some("encoders") => Stream::Encoders,
-                Some("mount_orientation") => Stream::MountOrientation,
-                Some("raw_imu") => Stream::RawImu,
-                _ => Stream::AttitudeStatus,
-            };
+            let stream = values.index("stream", &STREAMS).map_or(Stream::AttitudeStatus, |at| Stream::ALL[at]);
             let rate = match (values.number("rate_hz"), values.word("rate_hz")) {
                 (Some(hertz), _) => StreamRate::Hertz(hertz as u8),
                 (None, Some("off")) => StreamRate::Off,
@@ -300,41 +299,17 @@ pub const ACTIONS: &[Action] = &[
     }),
 ];
 
-const RESET_MODES: [&str; 5] = ["yaw", "pitch_and_yaw", "pitch_down_up_and_yaw", "pitch_down_up", "pitch_mapping"];
-
-const RADIO_TYPES: [&str; 11] = [
-    "sbus_fasst",
-    "joystick",
-    "jr_11bit",
-    "jr_10bit",
-    "ppm",
-    "sync",
-    "lb2_single",
-    "lb2_normal",
-    "sync2",
-    "sbus_sfhss",
-    "herelink",
-];
-const RADIO_TYPE_VALUES: [RadioType; RADIO_TYPES.len()] = [
-    RadioType::SbusFasst,
-    RadioType::Joystick,
-    RadioType::Jr11Bit,
-    RadioType::Jr10Bit,
-    RadioType::Ppm,
-    RadioType::Sync,
-    RadioType::Lb2Single,
-    RadioType::Lb2Normal,
-    RadioType::Sync2,
-    RadioType::SbusSfhss,
-    RadioType::Herelink,
-];
+const RESET_MODES: [&str; ResetMode::ALL.len()] = words!(ResetMode);
+const RADIO_TYPES: [&str; RadioType::ALL.len()] = words!(RadioType);
+const STREAMS: [&str; Stream::ALL.len()] = words!(Stream);
+const AXES: [&str; Axis::ALL.len()] = words!(Axis);
 
 const YAW_FRAME: Field = optional(word(
     "yaw_frame",
     "what yaw counts from and is kept to: the nose (the default) or North",
     &["vehicle", "earth"],
 ));
-const AXIS: Field = word("axis", "pitch is tilt, yaw is pan", &["tilt", "roll", "pan"]);
+const AXIS: Field = word("axis", "pitch is tilt, yaw is pan", &AXES);
 
 /// One without fields.
 const fn plain(
@@ -389,11 +364,7 @@ fn yaw_frame(values: &Values) -> YawFrame {
 }
 
 fn axis(values: &Values) -> Axis {
-    match values.word("axis") {
-        Some("roll") => Axis::Roll,
-        Some("pan") => Axis::Pan,
-        _ => Axis::Tilt,
-    }
+    values.index("axis", &AXES).map_or(Axis::Tilt, |at| Axis::ALL[at])
 }
 
 fn needs_one(values: &Values, names: &[&'static str]) -> Result<(), Wrong> {

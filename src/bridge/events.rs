@@ -9,6 +9,7 @@ use super::announcements::{Announcement, Subject};
 use super::roster::Gimbal;
 use super::settings::Role;
 use super::snapshot::EventSnapshot;
+use crate::gimbals::operation::Operation;
 use crate::manager::control::Place;
 use crate::manager::events::{Event, Names};
 use crate::manager::messages;
@@ -98,12 +99,16 @@ impl Bridge {
     }
 
     /// An event is remembered, and said where the pilot must know it.
-    pub(super) fn handle_event(&mut self, now: Timestamp, at: usize, event: Event) {
+    pub(super) fn handle_event(&mut self, now: Timestamp, at: usize, mut event: Event) {
+        if let Event::Operated { operation: Operation::SetParameter { name, .. }, before, .. } = &mut event {
+            // It is given on to the driver after this.
+            *before = self.roster.get_mut(at).driver.details(now).parameters.get(name).copied();
+        }
         let component = self.roster.get_mut(at).component;
         let names = self.names(component);
         let subject = subject(self.roster.get_mut(at), names, self.autopilot);
-        self.events.note(now, subject.name, names, event);
         let announcement = self.announcements.handle_event(now, subject, &event);
+        self.events.note(now, subject.name, names, event);
         self.announce(now, component, announcement);
         self.announce_state(now, at);
     }

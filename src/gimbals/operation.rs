@@ -3,6 +3,8 @@
 //! Where it looks is a demand, which every family understands ([`Setpoint`](super::setpoint::Setpoint)). An operation is
 //! for the families that have the like; the others answer [`OperationError::Unsupported`].
 
+use std::fmt;
+
 use crate::geometry::AxisLimits;
 
 /// Tells the answers to several operations apart.
@@ -81,6 +83,34 @@ impl Operation {
         }
     }
 
+    /// All that is asked, in words.
+    pub fn describe(&self) -> String {
+        let on = |is_on: bool| if is_on { "on" } else { "off" };
+        match self {
+            Self::Reset(mode) => format!("reset {}", mode.name()),
+            Self::SetStreamRate { stream, rate } => format!("stream rate {} {rate}", stream.name()),
+            Self::SetParameter { name, value } => format!("parameter {name} = {value}"),
+            Self::SetAxisMotion { axis, motion } => format!("motion of {}: {motion}", axis.name()),
+            Self::SetMotorControl(motors) => format!("motor control: {motors}"),
+            Self::SetLimits { axis, limits } => {
+                let [min, max] = [limits.min(), limits.max()].map(|limit| (limit.degrees() * 10.0).round() / 10.0);
+                format!("limits of {}: {min}° to {max}°", axis.name())
+            }
+            Self::SetRadioType(kind) => format!("radio type {}", kind.name()),
+            Self::SetEncoderUnit(EncoderUnit::Counts) => "encoder unit counts".to_owned(),
+            Self::SetEncoderUnit(EncoderUnit::Angles) => "encoder unit angles".to_owned(),
+            Self::SetCombinedAttitude(is_on) => format!("combined attitude {}", on(*is_on)),
+            Self::SetHomeOnModeChange(is_on) => format!("home on mode change {}", on(*is_on)),
+            Self::Motors(_)
+            | Self::Restart(_)
+            | Self::SetYawMode(_)
+            | Self::Mapping
+            | Self::RadioControl
+            | Self::RequestInformation
+            | Self::RefreshParameters => self.name().replace('_', " "),
+        }
+    }
+
     /// Whether it takes the place of where the gimbal was told to look: the setpoint, said again, would undo it.
     pub const fn ends_demand(&self) -> bool {
         matches!(
@@ -136,6 +166,21 @@ pub enum ResetMode {
     PitchMapping,
 }
 
+impl ResetMode {
+    pub const ALL: [Self; 5] =
+        [Self::Yaw, Self::PitchAndYaw, Self::PitchDownUpAndYaw, Self::PitchDownUp, Self::PitchMapping];
+
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Yaw => "yaw",
+            Self::PitchAndYaw => "pitch_and_yaw",
+            Self::PitchDownUpAndYaw => "pitch_down_up_and_yaw",
+            Self::PitchDownUp => "pitch_down_up",
+            Self::PitchMapping => "pitch_mapping",
+        }
+    }
+}
+
 /// A message that a gimbal can stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Stream {
@@ -149,6 +194,19 @@ pub enum Stream {
     RawImu,
 }
 
+impl Stream {
+    pub const ALL: [Self; 4] = [Self::Encoders, Self::MountOrientation, Self::AttitudeStatus, Self::RawImu];
+
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Encoders => "encoders",
+            Self::MountOrientation => "mount_orientation",
+            Self::AttitudeStatus => "attitude_status",
+            Self::RawImu => "raw_imu",
+        }
+    }
+}
+
 /// How often a message is sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StreamRate {
@@ -159,6 +217,16 @@ pub enum StreamRate {
     Hertz(u8),
 }
 
+impl fmt::Display for StreamRate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Off => f.write_str("off"),
+            Self::Default => f.write_str("default"),
+            Self::Hertz(hertz) => write!(f, "{hertz} Hz"),
+        }
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Axis {
     /// Pitch.
@@ -166,6 +234,18 @@ pub enum Axis {
     Roll,
     /// Yaw.
     Pan,
+}
+
+impl Axis {
+    pub const ALL: [Self; 3] = [Self::Tilt, Self::Roll, Self::Pan];
+
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Tilt => "tilt",
+            Self::Roll => "roll",
+            Self::Pan => "pan",
+        }
+    }
 }
 
 /// How one axis moves; what is `None` stays as it is.
@@ -183,6 +263,20 @@ pub struct AxisMotion {
     pub control_smoothing: Option<f64>,
     /// Turns the other way under radio control.
     pub reversed: Option<bool>,
+}
+
+impl fmt::Display for AxisMotion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let numbers = [
+            ("follow_speed", self.follow_speed),
+            ("follow_smoothing", self.follow_smoothing),
+            ("follow_window_deg", self.follow_window_deg),
+            ("control_speed_dps", self.control_speed_dps),
+            ("control_smoothing", self.control_smoothing),
+        ];
+        let reversed = self.reversed.map(|reversed| format!("reversed {reversed}"));
+        f.write_str(&given(&numbers).chain(reversed).collect::<Vec<_>>().join(", "))
+    }
 }
 
 /// How the motors hold the camera; the gimbal's own scales. What is `None` stays as it is.
@@ -203,6 +297,28 @@ pub struct MotorAxis {
     pub hold_strength: Option<f64>,
 }
 
+impl fmt::Display for MotorControl {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let numbers = [
+            ("tilt_stiffness", self.tilt.stiffness),
+            ("tilt_hold_strength", self.tilt.hold_strength),
+            ("roll_stiffness", self.roll.stiffness),
+            ("roll_hold_strength", self.roll.hold_strength),
+            ("pan_stiffness", self.pan.stiffness),
+            ("pan_hold_strength", self.pan.hold_strength),
+            ("gyro_filter", self.gyro_filter),
+            ("output_filter", self.output_filter),
+            ("gain", self.gain),
+        ];
+        f.write_str(&given(&numbers).collect::<Vec<_>>().join(", "))
+    }
+}
+
+/// Those that do not stay as they are.
+fn given(numbers: &[(&str, Option<f64>)]) -> impl Iterator<Item = String> {
+    numbers.iter().filter_map(|(name, value)| value.map(|value| format!("{name} {value}")))
+}
+
 /// The kind of radio receiver that the gimbal listens to; [`Sync`](Self::Sync) is control by MAVLink.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RadioType {
@@ -217,6 +333,38 @@ pub enum RadioType {
     Sync2,
     SbusSfhss,
     Herelink,
+}
+
+impl RadioType {
+    pub const ALL: [Self; 11] = [
+        Self::SbusFasst,
+        Self::Joystick,
+        Self::Jr11Bit,
+        Self::Jr10Bit,
+        Self::Ppm,
+        Self::Sync,
+        Self::Lb2Single,
+        Self::Lb2Normal,
+        Self::Sync2,
+        Self::SbusSfhss,
+        Self::Herelink,
+    ];
+
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::SbusFasst => "sbus_fasst",
+            Self::Joystick => "joystick",
+            Self::Jr11Bit => "jr_11bit",
+            Self::Jr10Bit => "jr_10bit",
+            Self::Ppm => "ppm",
+            Self::Sync => "sync",
+            Self::Lb2Single => "lb2_single",
+            Self::Lb2Normal => "lb2_normal",
+            Self::Sync2 => "sync2",
+            Self::SbusSfhss => "sbus_sfhss",
+            Self::Herelink => "herelink",
+        }
+    }
 }
 
 /// What `MOUNT_STATUS` carries.
@@ -263,3 +411,36 @@ pub enum OperationError {
 
 /// What became of an operation.
 pub type OperationResult = Result<(), OperationError>;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Angle;
+
+    /// What was asked is told with its numbers, and only with those that were given.
+    #[test]
+    fn what_is_asked_is_told_whole() {
+        let limits = AxisLimits::new(Angle::from_degrees(-45.0), Angle::from_degrees(30.5)).expect("in order");
+        let pan = MotorAxis { stiffness: Some(40.0), hold_strength: None };
+        let motion = AxisMotion { follow_speed: Some(50.0), reversed: Some(true), ..AxisMotion::default() };
+        for (operation, text) in [
+            (Operation::Restart(Restart::Reboot), "reboot"),
+            (Operation::Reset(ResetMode::PitchAndYaw), "reset pitch_and_yaw"),
+            (Operation::SetParameter { name: "PWR_PAN".to_owned(), value: 60.0 }, "parameter PWR_PAN = 60"),
+            (Operation::SetAxisMotion { axis: Axis::Pan, motion }, "motion of pan: follow_speed 50, reversed true"),
+            (
+                Operation::SetMotorControl(MotorControl { pan, gain: Some(3.0), ..MotorControl::default() }),
+                "motor control: pan_stiffness 40, gain 3",
+            ),
+            (Operation::SetLimits { axis: Axis::Tilt, limits }, "limits of tilt: -45° to 30.5°"),
+            (Operation::SetRadioType(RadioType::Herelink), "radio type herelink"),
+            (
+                Operation::SetStreamRate { stream: Stream::RawImu, rate: StreamRate::Hertz(50) },
+                "stream rate raw_imu 50 Hz",
+            ),
+            (Operation::SetCombinedAttitude(false), "combined attitude off"),
+        ] {
+            assert_eq!(operation.describe(), text);
+        }
+    }
+}

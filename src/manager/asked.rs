@@ -254,7 +254,7 @@ impl GimbalManager {
         if operation.needs_control() {
             self.last_command = None;
             self.note_demand(now, who);
-            self.tell(Event::Operated { who, operation: operation.name() });
+            self.tell(Event::Operated { who, operation: operation.clone(), before: None });
         }
         if operation.ends_demand() {
             if self.tracking.stop_rates(now) {

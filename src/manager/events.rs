@@ -1,10 +1,11 @@
 //! What happened around a gimbal, as far as a person may want to know it.
 
 use super::control::{Change, How, Place};
+use crate::gimbals::operation::Operation;
 use crate::wire::MavId;
 
 /// Something that happened around one gimbal.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Event {
     /// A place changed hands.
     Control(Change),
@@ -43,10 +44,12 @@ pub enum Event {
     Fault {
         what: &'static str,
     },
-    /// Something else than where it looks was asked of the gimbal, and given on to it.
+    /// Something else than where it looks was asked of the gimbal, and given on to it. A parameter was `before`, where that
+    /// is known.
     Operated {
         who: MavId,
-        operation: &'static str,
+        operation: Operation,
+        before: Option<f64>,
     },
     /// A rotation was stopped because nobody asked for it any more.
     RatesEnded {
@@ -176,7 +179,7 @@ impl Event {
         match *self {
             Self::Refused { reason, .. } => Some(reason),
             Self::Fault { what } => Some(what),
-            Self::Operated { operation, .. } => Some(operation),
+            Self::Operated { ref operation, .. } => Some(operation.name()),
             Self::Doubtful { doubt, .. } => Some(doubt.name()),
             Self::RatesEnded { end: RatesEnd::TimedOut, .. } => Some("timed_out"),
             Self::RatesEnded { end: RatesEnd::SenderSilent, .. } => Some("sender_silent"),
@@ -205,7 +208,10 @@ impl Event {
             Self::Lost { .. } => "gimbal lost".to_owned(),
             Self::Restarted { .. } => "gimbal restarted; it holds still until somebody asks".to_owned(),
             Self::Fault { what } => format!("fault: {what}"),
-            Self::Operated { who, operation } => format!("{} asked for {}", names.of(who), operation.replace('_', " ")),
+            Self::Operated { who, ref operation, before } => {
+                let before = before.map(|before| format!(" (it was {before})")).unwrap_or_default();
+                format!("{} asked for {}{before}", names.of(who), operation.describe())
+            }
             Self::RatesEnded { who, end: RatesEnd::TimedOut } => {
                 format!("rotation stopped: {} did not ask for it again", names.of(who))
             }
@@ -304,12 +310,15 @@ fn describe_change(change: Change, names: Names) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gimbals::operation::Motors;
 
     /// "Who is in control, since when, why somebody was refused": as sentences.
     #[test]
     fn events_read_as_sentences() {
         let (gcs, autopilot, script) = (MavId::new(255, 190), MavId::new(1, 1), MavId::new(245, 191));
         let change = |how, who, from, to| Event::Control(Change { place: Place::Primary, how, who, from, to });
+        let operated = |operation, before| Event::Operated { who: MavId::new(1, 191), operation, before };
+        let set = |name: &str, value| Operation::SetParameter { name: name.to_owned(), value };
         for (event, text) in [
             (change(How::TakenOver, script, Some(gcs), Some(script)), "245/191 took control from 255/190"),
             (change(How::TakenOver, script, Some(gcs), Some(autopilot)), "245/191 took control from 255/190 for 1/1"),
@@ -328,7 +337,9 @@ mod tests {
                 Event::Refused { who: script, reason: "unknown_gimbal", holder: None },
                 "245/191 was refused: it named a gimbal that is not here",
             ),
-            (Event::Operated { who: MavId::new(1, 191), operation: "motors_off" }, "http asked for motors off"),
+            (operated(Operation::Motors(Motors::Off), None), "http asked for motors off"),
+            (operated(set("PWR_PAN", 60.0), Some(55.0)), "http asked for parameter PWR_PAN = 60 (it was 55)"),
+            (operated(set("PWR_PAN", 0.5), None), "http asked for parameter PWR_PAN = 0.5"),
             (
                 Event::Refused { who: MavId::new(1, 191), reason: "not_in_control", holder: Some(gcs) },
                 "http was refused: 255/190 is in control",

@@ -277,8 +277,12 @@ fn settings_are_written_and_read_back() {
 fn a_parameter_by_its_name() {
     let (mut world, places) = controlled(Generation::V1);
     let set = |name: &str, value| Operation::SetParameter { name: name.to_owned(), value };
+    let before = seen(&world).details.parameters["GYRO_LPF"];
     assert_eq!(operate(&mut world, places, set("GYRO_LPF", 6.0)), Some(Ok(())));
     assert_eq!(seen(&world).details.parameters["GYRO_LPF"], 6.0);
+    let told = world.snapshot().events[0].clone();
+    let text = format!("http asked for parameter GYRO_LPF = 6 (it was {before})");
+    assert_eq!((told.what.as_str(), told.reason.as_deref(), told.text), ("operated", Some("set_parameter"), text));
     assert_eq!(
         operate(&mut world, places, set("MAV_TS_ENCNT", 5.0)),
         failed(OperationError::NoEffect("MAV_TS_ENCNT is 1".to_owned()))
