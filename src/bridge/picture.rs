@@ -172,6 +172,7 @@ impl Bridge {
             pitch_deg: Some(angles.pitch.degrees()),
             yaw_vehicle_deg: in_frame(YawFrame::Vehicle),
             yaw_earth_deg: in_frame(YawFrame::Earth),
+            assumed: status.is_assumed,
             age_ms: Some(millis(now.since(at))),
         }
     }

@@ -167,6 +167,9 @@ pub struct AttitudeSnapshot {
     pub pitch_deg: Option<f64>,
     pub yaw_vehicle_deg: Option<f64>,
     pub yaw_earth_deg: Option<f64>,
+    /// The gimbal tells nothing: it is where it would be if it did what it is told.
+    #[serde(default)]
+    pub assumed: bool,
     pub age_ms: Option<u64>,
 }
 

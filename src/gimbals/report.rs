@@ -49,6 +49,8 @@ pub struct Identity {
 /// The device's attitude and state (`GIMBAL_DEVICE_ATTITUDE_STATUS` or its equivalent).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GimbalStatus {
+    /// The device tells nothing: it is where it would be if it did what it is told.
+    pub is_assumed: bool,
     pub attitude: GimbalAttitude,
     /// Roll, pitch and yaw rate where the device knows them.
     pub rates: [Option<AngularRate>; 3],

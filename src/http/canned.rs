@@ -88,6 +88,7 @@ fn held_gimbal() -> GimbalSnapshot {
             pitch_deg: Some(-42.5),
             yaw_vehicle_deg: Some(30.0),
             yaw_earth_deg: Some(117.0),
+            assumed: false,
             age_ms: Some(18),
         },
         setpoint: Some(SetpointSnapshot {

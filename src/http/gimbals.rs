@@ -14,7 +14,7 @@ use crate::bridge::snapshot::{GimbalSnapshot, Snapshot};
 
 /// What of a gimbal can be read by itself, and what that is.
 pub const PARTS: [(&str, &str); 6] = [
-    ("attitude", "Where it looks"),
+    ("attitude", "Where it looks; assumed where it does not tell"),
     ("setpoint", "What it is told, null before the first demand"),
     ("control", "Who is in control"),
     ("details", "What only its family knows of it"),

@@ -68,7 +68,8 @@ fn status_is_the_whole_snapshot() {
                 "name": "camera", "configured": true, "family": "mavlink_v2", "manager_component_id": 191, "device_id": 154,
                 "device": "1/154", "state": "alive", "vendor": "Acme", "model": "Pixy", "firmware": "7.8.1",
                 "attitude": {
-                    "roll_deg": 0.25, "pitch_deg": -42.5, "yaw_vehicle_deg": 30.0, "yaw_earth_deg": 117.0, "age_ms": 18,
+                    "roll_deg": 0.25, "pitch_deg": -42.5, "yaw_vehicle_deg": 30.0, "yaw_earth_deg": 117.0, "assumed": false,
+                    "age_ms": 18,
                 },
                 "setpoint": {
                     "mode": "angle", "pitch_deg": -45.0, "yaw_deg": 120.0, "yaw_frame": "earth",
@@ -87,7 +88,8 @@ fn status_is_the_whole_snapshot() {
                 "name": "lamp", "configured": true, "family": "auto", "manager_component_id": 192, "device_id": null,
                 "device": null, "state": "searching", "vendor": null, "model": null, "firmware": null,
                 "attitude": {
-                    "roll_deg": null, "pitch_deg": null, "yaw_vehicle_deg": null, "yaw_earth_deg": null, "age_ms": null,
+                    "roll_deg": null, "pitch_deg": null, "yaw_vehicle_deg": null, "yaw_earth_deg": null, "assumed": false,
+                    "age_ms": null,
                 },
                 "setpoint": null, "primary": null, "secondary": null, "primary_age_ms": null, "secondary_age_ms": null,
                 "lender": null, "takeover": "open", "roi": null,

@@ -194,6 +194,7 @@ impl Core {
         let angles =
             GimbalAngles { roll: Angle::ZERO, pitch: Angle::ZERO, yaw: Yaw::InVehicleFrame(Angle::ZERO).angle() };
         core.say(DriverOutput::Report(Report::Attitude(GimbalStatus {
+            is_assumed: false,
             attitude: GimbalAttitude::InVehicleFrame(Attitude::from_gimbal_angles(angles)),
             rates: [None; 3],
             heading: None,

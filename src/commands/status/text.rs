@@ -140,7 +140,7 @@ fn gimbal(out: &mut Lines, gimbal: &GimbalSnapshot) {
             degrees(attitude.pitch_deg),
             degrees(attitude.yaw_vehicle_deg),
             degrees(attitude.yaw_earth_deg),
-            age(attitude.age_ms)
+            if attitude.assumed { "assumed: it does not tell".to_owned() } else { age(attitude.age_ms) }
         ),
     );
     let held = |id: &Option<String>, ms: Option<u64>| {
@@ -378,6 +378,16 @@ gimbals
         };
         let report = report(&Snapshot { vehicle, ..Snapshot::default() });
         assert!(report.contains("\n  gimbals   get its state\n  stale     heading position\n"), "{report}");
+    }
+
+    /// A gimbal that tells nothing is where it would be if it did what it is told.
+    #[test]
+    fn what_is_assumed_is_not_shown_as_told() {
+        let mut snapshot = canned::snapshot();
+        snapshot.gimbals[0].attitude.assumed = true;
+        let report = report(&snapshot);
+        let line = "  attitude  roll 0.3°  pitch -42.5°  yaw 30.0° from the nose, 117.0° from North  assumed: it does not tell\n";
+        assert!(report.contains(line), "{report}");
     }
 
     #[test]

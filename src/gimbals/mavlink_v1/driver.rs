@@ -223,6 +223,7 @@ impl MavlinkV1Driver {
             Some((_, MountControl::Angles(_))) | None => GimbalFlags::ROLL_LOCK | GimbalFlags::PITCH_LOCK,
         };
         self.report(Report::Attitude(GimbalStatus {
+            is_assumed: self.feedback == Feedback::OpenLoop,
             attitude: GimbalAttitude::InVehicleFrame(attitude),
             rates: [None; 3],
             heading: None,

@@ -174,6 +174,7 @@ impl MavlinkV2Driver {
         let heading = self.trusted_heading(&status);
         let accepts_earth_yaw = self.accepts_earth_yaw(status.flags);
         self.outputs.push_back(DriverOutput::Report(Report::Attitude(GimbalStatus {
+            is_assumed: false,
             attitude,
             rates: status.rates,
             heading,

@@ -130,7 +130,9 @@ fn client_items_e15_e41_to_e45_and_e53_the_manager_streams_what_its_gimbal_says(
         let heard = from_m(&world.take(places.ground));
         let statuses: Vec<GIMBAL_DEVICE_ATTITUDE_STATUS_DATA> = of(&heard);
         assert_eq!(statuses.len(), 20, "{reports:?}");
-        let heading = world.snapshot().vehicle.heading_deg.expect("it flies").to_radians();
+        let snapshot = world.snapshot();
+        assert_eq!(snapshot.gimbals[0].attitude.assumed, reports == Feedback::Nothing, "{reports:?}");
+        let heading = snapshot.vehicle.heading_deg.expect("it flies").to_radians();
         let last = statuses.last().expect("there are twenty");
         assert!((f64::from(last.delta_yaw) - heading).sin().abs() < 0.05, "{} and {heading}", last.delta_yaw);
         for status in &statuses {

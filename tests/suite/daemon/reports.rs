@@ -69,7 +69,7 @@ const GIMBAL: &[&str] = &[
     "presented",
     "details",
 ];
-const ATTITUDE: &[&str] = &["roll_deg", "pitch_deg", "yaw_vehicle_deg", "yaw_earth_deg", "age_ms"];
+const ATTITUDE: &[&str] = &["roll_deg", "pitch_deg", "yaw_vehicle_deg", "yaw_earth_deg", "assumed", "age_ms"];
 const SETPOINT: &[&str] = &[
     "mode",
     "pitch_deg",

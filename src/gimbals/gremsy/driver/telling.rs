@@ -50,6 +50,7 @@ impl GremsyDriver {
         self.tell_attitude(
             now,
             GimbalStatus {
+                is_assumed: false,
                 attitude,
                 rates: [None; 3],
                 heading: None,

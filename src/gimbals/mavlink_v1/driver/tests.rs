@@ -228,6 +228,11 @@ fn statement_47_without_reports_the_attitude_is_a_slow_guess() {
     let mut line = Line::new(Signs::NORMAL, Reports::Nothing);
     line.run_for(4 * SECOND);
     assert!(line.is_open_loop());
+    let last = line.reports.iter().rev().find_map(|(_, report)| match report {
+        Report::Attitude(status) => Some(status.is_assumed),
+        _ => None,
+    });
+    assert_eq!(last, Some(true));
     assert_near(line.reported(), (0.0, 0.0));
 
     line.point(-60.0, 0.0);

@@ -494,6 +494,7 @@ impl Court {
         let angles =
             GimbalAngles { roll: Angle::ZERO, pitch: Angle::from_degrees(LOOKS.0), yaw: Angle::from_degrees(LOOKS.1) };
         let status = GimbalStatus {
+            is_assumed: false,
             attitude: GimbalAttitude::InVehicleFrame(Attitude::<VehicleFrame>::from_gimbal_angles(angles)),
             rates: [None; 3],
             heading: (gimbal != Gimbal::Lost).then(|| Angle::from_degrees(HEADING)),
