@@ -6,6 +6,7 @@ import time
 from collections import deque
 from typing import NamedTuple
 
+from stalls import stalled
 from steps import Failure, angle_between, wait_for
 
 
@@ -75,6 +76,8 @@ class Attitudes:
     def __init__(self):
         self._lock = threading.Lock()
         self._seen = deque(maxlen=2000)
+        # From where the last GIMBAL_DEVICE_ATTITUDE_STATUS counted the yaw.
+        self.status_yaw = None
 
     def add(self, pitch, yaw_vehicle=None, yaw_north=None, roll=None, clock=None):
         now = time.monotonic()
@@ -86,7 +89,9 @@ class Attitudes:
         roll, pitch, yaw = angles_of(message.q)
         heading = math.degrees(message.delta_yaw)
         clock = message.time_boot_ms / 1000
-        if message.flags & YAW_IN_EARTH_FRAME:
+        in_earth_frame = message.flags & YAW_IN_EARTH_FRAME
+        self.status_yaw = "yaw_north" if in_earth_frame else "yaw_vehicle"
+        if in_earth_frame:
             self.add(pitch, wrapped(yaw - heading), yaw, roll, clock)
         else:
             self.add(pitch, yaw, wrapped(yaw + heading), roll, clock)
@@ -134,21 +139,19 @@ class Attitudes:
                 if angle_between(getattr(seen, axis), angle) > within:
                     raise Failure(f"the camera moved from {wanted}: {seen}")
 
-    def watch(self, seconds):
-        """What arrives from now on for so long."""
+    def watch(self, seconds, least=1):
+        """What arrives from now on for so long, and until it is `least` attitudes."""
         started = time.monotonic()
         wait_for(
-            lambda: f"attitudes over {seconds} s; there were {len(self.since(started))}",
-            lambda: (seen := self.since(started)) and seen[-1].time - started >= seconds,
+            lambda: f"{least} attitudes over {seconds} s; there were {len(self.since(started))}",
+            lambda: len(seen := self.since(started)) >= least and seen[-1].time - started >= seconds,
             seconds + 5,
         )
         return self.since(started)
 
     def rates(self, axes, seconds=2.0):
         """How fast each of the `axes` turns, degrees per second, over so long from now on."""
-        seen = self.watch(seconds)
-        if len(seen) < 5:
-            raise Failure(f"only {len(seen)} attitudes in {seconds} s")
+        seen = self.watch(seconds, least=5)
         return [slope(seen, axis) for axis in axes]
 
     def rate(self, axis, seconds=2.0):
@@ -156,7 +159,8 @@ class Attitudes:
 
     def wait_still(self, axis, timeout=6):
         """Waits until `axis` has stopped turning."""
-        deadline = time.monotonic() + timeout
+        started = time.monotonic()
         while abs(rate := self.rate(axis, 0.5)) > 0.5:
-            if time.monotonic() > deadline:
+            now = time.monotonic()
+            if now - started - stalled(started, now) > timeout:
                 raise Failure(f"{axis} still turns at {rate:.2f} °/s after {timeout} s")

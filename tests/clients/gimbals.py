@@ -16,7 +16,7 @@ class Gimbal(NamedTuple):
     model: str = "Simulated v2"
     # How near it comes to a yaw from North while the vehicle turns, degrees: one that is turned for it lags behind.
     within_north: float = 1.0
-    # From where GIMBAL_DEVICE_ATTITUDE_STATUS counts the yaw of this gimbal.
+    # From where GIMBAL_DEVICE_ATTITUDE_STATUS counts the yaw of this gimbal; None where that changes.
     status_yaw: str = "yaw_north"
     # Whether it tells that it is retracted, or only goes to where it is stowed.
     tells_retract: bool = True
@@ -45,7 +45,18 @@ def gremsy(generation):
     options = ("--family", "gremsy", "--gremsy-generation", generation, "--slew", "100")
     # Only the one that is no v2 device needs an id of its own.
     device = {"v1": 1, "v2": 154}[generation]
-    return Gimbal(f"gremsy_{generation}", options, "gremsy", (191, device), "GREMSY", "MIO", tells_retract=False)
+    # The second generation speaks for itself: from North while yaw is locked, else from the nose.
+    status_yaw = {"v1": "yaw_north", "v2": None}[generation]
+    return Gimbal(
+        f"gremsy_{generation}",
+        options,
+        "gremsy",
+        (191, device),
+        "GREMSY",
+        "MIO",
+        status_yaw=status_yaw,
+        tells_retract=False,
+    )
 
 
 MAVLINK_V2 = Gimbal("mavlink_v2", ("--frames", "strict"))

@@ -18,8 +18,8 @@ from steps import Failure, Steps, expect
 class Remote(Client):
     has_commands = False
 
-    def __init__(self, server, kind):
-        self._kind = kind
+    def __init__(self, server, rig):
+        self._rig = rig
         self.library = Library(server.grpc_port)
         self.plugin = self.library.drone.gimbal
         self.attitudes = Attitudes()
@@ -29,7 +29,8 @@ class Remote(Client):
 
     def _handle_attitude(self, angles):
         # It hands on the yaw as it came, and not from where.
-        self.attitudes.add(angles.pitch_deg, roll=angles.roll_deg, **{self._kind.status_yaw: angles.yaw_deg})
+        yaw = self._rig.kind.status_yaw or self._rig.camera.status_yaw
+        self.attitudes.add(angles.pitch_deg, roll=angles.roll_deg, **{yaw: angles.yaw_deg})
 
     def _handle_control(self, control):
         self._control = control
@@ -79,7 +80,7 @@ def main():
         with Rig("mavsdk-1", gimbal=gimbal) as rig:
             with Server(f"udp://:{rig.listener_port}", "mavsdk-1-server.log") as server:
                 clients = []
-                steps.run("connects", lambda: clients.append(Remote(server, gimbal)), essential=True)
+                steps.run("connects", lambda: clients.append(Remote(server, rig)), essential=True)
                 Vocabulary(steps, rig, clients[0], rig.listener).run()
                 clients[0].library.close()
 

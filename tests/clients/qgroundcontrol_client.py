@@ -118,6 +118,14 @@ class Waiting:
         self.sent_at = time.monotonic()
 
 
+class ThrownAway(NamedTuple):
+    """A command that was not sent, because at `until` the one of `since` had no answer yet."""
+
+    key: tuple
+    since: float
+    until: float
+
+
 class QGroundControl:
     """`with QGroundControl(port, generation) as client:`; its calls are what the operator does."""
 
@@ -272,7 +280,7 @@ class QGroundControl:
         if command == SET_MESSAGE_INTERVAL:
             key += (parameters[0],)
         if key in self._waiting:
-            self.thrown_away.append(key)
+            self.thrown_away.append(ThrownAway(key, self._waiting[key].sent_at, time.monotonic()))
             return
         parameters = list(parameters) + [0.0] * (7 - len(parameters))
 

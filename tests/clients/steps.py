@@ -15,6 +15,11 @@ class Stopped(Exception):
     """The rest of the script makes no sense."""
 
 
+# Seconds between two looks, and what such a pause counts at most: if it lasts longer, nobody here had a processor.
+LOOK = 0.01
+LONGEST_LOOK = 0.03
+
+
 def wait_for(what, condition, timeout):
     """Returns what `condition` gives as soon as that is true; `what` says what is missing after `timeout` seconds."""
     deadline = time.monotonic() + timeout
@@ -22,9 +27,11 @@ def wait_for(what, condition, timeout):
         result = condition()
         if result:
             return result
-        if time.monotonic() > deadline:
+        slept_at = time.monotonic()
+        if slept_at > deadline:
             raise Failure(f"not within {timeout:g} s: {what() if callable(what) else what}")
-        time.sleep(0.01)
+        time.sleep(LOOK)
+        deadline += max(0, time.monotonic() - slept_at - LONGEST_LOOK)
 
 
 def expect(condition, otherwise):
