@@ -23,6 +23,7 @@ mod inquiries;
 mod mount;
 mod mount_reports;
 mod ownership;
+mod readiness;
 pub mod roi;
 pub mod rotation;
 mod telling;
@@ -53,6 +54,7 @@ use messages::Interval;
 use mount::MountSenders;
 use mount_reports::MountReports;
 use rank::Ranks;
+use readiness::ReadinessWatch;
 use request::{Demand, DemandKind, Refusal, Request};
 use rotation::Rotation;
 use settings::ControlSettings;
@@ -153,6 +155,7 @@ pub struct GimbalManager {
     state: DeviceState,
     identity: Identity,
     capabilities: Option<Capabilities>,
+    readiness: ReadinessWatch,
     status: Option<(Timestamp, GimbalStatus)>,
     /// A sign of the device was heard, and it was not lost since.
     is_heard: bool,
@@ -206,6 +209,7 @@ impl GimbalManager {
             state: DeviceState::Searching,
             identity: Identity::default(),
             capabilities: None,
+            readiness: ReadinessWatch::default(),
             status: None,
             is_heard: false,
             rotation: None,
@@ -348,7 +352,7 @@ impl GimbalManager {
         // Without a device there is nothing to tell of.
         let schedules = schedules.into_iter().flatten().filter(|_| self.device.is_some());
         let lease = self.rules.lease_timeout;
-        let tracking = self.tracking.poll_timeout().filter(|_| self.paused_by.is_none());
+        let tracking = self.tracking.poll_timeout().filter(|_| self.paused_by.is_none() && self.readiness.is_ready());
         let control = self.control.poll_timeout(lease);
         let rest =
             [tracking, control, self.source_lost_at(), self.rotation_due(), self.autopilot_client.poll_timeout()];
@@ -405,7 +409,7 @@ impl GimbalManager {
         if !nudges {
             voice.needs_whole()?;
         }
-        if demand.is_stop() && self.stop_unknown(now) {
+        if demand.is_stop() && self.stop_unsteerable(now) {
             return Ok(());
         }
         let capabilities = *self.steerable()?;
@@ -452,7 +456,8 @@ impl GimbalManager {
             let who = self.tracking.source();
             self.tell(if roi.is_some() { Event::RoiStarted { who } } else { Event::RoiEnded { who } });
         }
-        if let Some(capabilities) = self.capabilities.filter(|_| self.paused_by.is_none()) {
+        if let Some(capabilities) = self.capabilities.filter(|_| self.paused_by.is_none() && self.readiness.is_ready())
+        {
             let situation = self.situation(now, &capabilities, around);
             if let Some(setpoint) = self.tracking.steer(now, &situation) {
                 self.outputs.push_back(ManagerOutput::Steer(setpoint));

@@ -36,8 +36,8 @@ pub struct EventSnapshot {
     pub count: u64,
     pub gimbal: String,
     /// `taken`, `taken_over`, `borrowed`, `restored`, `delegated`, `released`, `cleared`, `lapsed`, `holder_restarted`, `system_gone`,
-    /// `refused`, `acquire_war`, `gimbal_found`, `gimbal_back`, `gimbal_lost`, `gimbal_restarted`, `fault`, `operated`, `rates_ended`, `roi_started` or
-    /// `roi_ended`.
+    /// `refused`, `acquire_war`, `gimbal_found`, `gimbal_back`, `gimbal_lost`, `gimbal_restarted`, `gimbal_ready`, `fault`,
+    /// `operated`, `rates_ended`, `roi_started` or `roi_ended`.
     pub what: String,
     /// Of control: `primary` or `secondary`.
     pub place: Option<String>,

@@ -23,6 +23,10 @@ pub enum Report {
     /// Enough is known of the device to steer it, or something of that has changed.
     Known(Identity, Capabilities),
     Attitude(GimbalStatus),
+    /// Whether one that is known can be steered at this moment. One whose driver never says so can.
+    Readiness(Readiness),
+    /// Nothing that it was told before turns it any more, whatever it may have missed.
+    Stands,
     /// Something is wrong with it that the pilot ought to know, in a few words; each is told once.
     Fault(&'static str),
     /// It said where it looks in a way that cannot be believed.
@@ -32,6 +36,18 @@ pub enum Report {
     },
     /// Nothing was heard of it for too long.
     Lost,
+}
+
+/// How far a device is on its way to being steered.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Readiness {
+    /// It can be steered.
+    #[default]
+    Ready,
+    /// It was asked to start again, or to switch itself off, and has neither done nor refused it.
+    AskedToRestart,
+    /// It is silent because it starts, or is got to know again.
+    Starting,
 }
 
 /// Who made the device, as it says.

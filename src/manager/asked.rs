@@ -219,7 +219,7 @@ impl GimbalManager {
             let demand = Demand { roll: zero, pitch: zero, yaw: zero, ..in_frame(frame.unwrap_or(held)) };
             return self.handle_demand(now, who, &demand, around);
         }
-        if frame.is_none() && self.stop_unknown(now) {
+        if frame.is_none() && self.stop_unsteerable(now) {
             return Ok(());
         }
         let capabilities = *self.steerable()?;

@@ -2,11 +2,12 @@
 
 use super::events::Event;
 use super::heading::HeadingBias;
+use super::readiness::ReadinessWatch;
 use super::request::Refusal;
 use super::voice::DeviceVoice;
 use super::{DeviceState, GimbalManager, Surroundings};
 use crate::gimbals::capabilities::Capabilities;
-use crate::gimbals::report::{GimbalStatus, Identity, Report};
+use crate::gimbals::report::{GimbalStatus, Identity, Readiness, Report};
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 use crate::wire::ids::{CommandResult, FailureFlags};
@@ -22,21 +23,29 @@ impl GimbalManager {
         }
         match report {
             Report::Restarted => {
-                // Its clock may have jumped while it goes on turning.
-                let was_turning = self.tracking.unstopped().is_some();
-                self.tracking.forget();
-                if was_turning {
-                    self.leave_turning();
-                    self.stop_what_was_left_turning(now);
-                }
+                self.forget_demand(now);
                 self.heading_bias = HeadingBias::default();
-                self.tell(Event::Restarted { device: self.device });
+                if self.readiness.handle_restarted() {
+                    self.tell(Event::Restarted { device: self.device });
+                }
             }
+            Report::Readiness(readiness) => {
+                if readiness == Readiness::Starting {
+                    self.paused_by = None;
+                    self.forget_demand(now);
+                }
+                if self.readiness.handle(readiness) {
+                    self.tell(Event::Ready { device: self.device });
+                }
+                self.stop_what_was_left_turning(now);
+            }
+            Report::Stands => self.forget_rotation(),
             Report::Alive { device } => {
                 if self.device.is_some_and(|before| before != device) {
                     self.rotation = None;
                 }
                 if self.device != Some(device) {
+                    self.readiness = ReadinessWatch::default();
                     self.tracking.forget();
                     self.heading_bias = HeadingBias::default();
                     self.identity = Identity::default();
@@ -46,10 +55,12 @@ impl GimbalManager {
                 }
                 let known = self.device.replace(device) == Some(device);
                 (self.state, self.is_heard) = (DeviceState::Alive, true);
+                self.readiness.handle_alive();
                 self.tell(if known { Event::Back { device } } else { Event::Found { device } });
                 self.stop_what_was_left_turning(now);
             }
             Report::AnotherFamily => {
+                self.readiness = ReadinessWatch::default();
                 self.tracking.forget();
                 self.heading_bias = HeadingBias::default();
                 self.capabilities = None;
@@ -175,10 +186,26 @@ impl GimbalManager {
         self.status.is_some_and(|(_, status)| status.failures.intersects(FailureFlags::HARD))
     }
 
+    /// Its setpoint is forgotten. Its clock may have jumped while it goes on turning: then it is stopped.
+    fn forget_demand(&mut self, now: Timestamp) {
+        let was_turning = self.tracking.unstopped().is_some();
+        self.tracking.forget();
+        if was_turning {
+            self.leave_turning();
+            self.stop_what_was_left_turning(now);
+        }
+    }
+
+    /// Whether it can be told where to look, as far as it concerns the gimbal.
+    pub(super) fn is_steerable(&self) -> bool {
+        self.capabilities.is_some() && self.readiness.is_ready()
+    }
+
     /// Whether there is a gimbal that can be steered now.
     pub(super) fn steerable(&self) -> Result<&Capabilities, Refusal> {
         match (self.state, &self.capabilities) {
             (DeviceState::Lost, _) => Err(Refusal { result: CommandResult::Failed, reason: "gimbal_lost" }),
+            (DeviceState::Alive, Some(_)) if !self.readiness.is_ready() => Err(Refusal::later("gimbal_starting")),
             (DeviceState::Alive, Some(capabilities)) => {
                 let calibrating =
                     self.status.is_some_and(|(_, status)| status.failures.contains(FailureFlags::CALIBRATION_RUNNING));

@@ -40,6 +40,10 @@ pub enum Event {
     Restarted {
         device: Option<MavId>,
     },
+    /// It can be steered again after it started or was lost.
+    Ready {
+        device: Option<MavId>,
+    },
     /// Something is wrong with the gimbal, in a few words.
     Fault {
         what: &'static str,
@@ -124,6 +128,7 @@ impl Event {
             Self::Back { .. } => "gimbal_back",
             Self::Lost { .. } => "gimbal_lost",
             Self::Restarted { .. } => "gimbal_restarted",
+            Self::Ready { .. } => "gimbal_ready",
             Self::Fault { .. } => "fault",
             Self::Operated { .. } => "operated",
             Self::RatesEnded { .. } => "rates_ended",
@@ -142,7 +147,7 @@ impl Event {
             | Self::RatesEnded { who, .. } => Some(who),
             Self::AcquireWar { holder, .. } => Some(holder),
             Self::Found { device } | Self::Back { device } => Some(device),
-            Self::Lost { device } | Self::Restarted { device } => device,
+            Self::Lost { device } | Self::Restarted { device } | Self::Ready { device } => device,
             Self::RoiStarted { who } | Self::RoiEnded { who } => who,
             Self::Fault { .. } => None,
         }
@@ -207,6 +212,7 @@ impl Event {
             Self::Back { device } => format!("gimbal {device} is back"),
             Self::Lost { .. } => "gimbal lost".to_owned(),
             Self::Restarted { .. } => "gimbal restarted; it holds still until somebody asks".to_owned(),
+            Self::Ready { .. } => "gimbal ready: it can be steered".to_owned(),
             Self::Fault { what } => format!("fault: {what}"),
             Self::Operated { who, ref operation, before } => {
                 let before = before.map(|before| format!(" (it was {before})")).unwrap_or_default();
@@ -266,6 +272,7 @@ fn explain(reason: &str) -> String {
         "not_an_id" => "it named something that is no id",
         "unknown_gimbal" => "it named a gimbal that is not here",
         "no_gimbal_yet" => "no gimbal was heard yet",
+        "gimbal_starting" => "the gimbal is starting; wait until it is ready, some 15 s, and ask again",
         "no_attitude" => "the attitude of the gimbal is not known",
         "no_heading" => "the heading of the vehicle is not known",
         "no_home_position" => "the autopilot has not told where home is; it is asked",

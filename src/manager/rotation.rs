@@ -52,7 +52,7 @@ impl GimbalManager {
     /// Nobody can be told what to do before it is known, but to stop.
     pub(super) fn stop_what_was_left_turning(&mut self, now: Timestamp) {
         let Some(rotation) = self.rotation.as_mut().filter(|rotation| rotation.is_left) else { return };
-        if self.capabilities.is_some() {
+        if self.capabilities.is_some() && self.readiness.is_ready() {
             rotation.is_left = false;
             let turning = rotation.turning;
             self.tracking.halt(now, turning);
@@ -62,16 +62,24 @@ impl GimbalManager {
         }
     }
 
-    /// Somebody who may wants a gimbal to stop that is not known yet; true where it can be told.
-    pub(super) fn stop_unknown(&mut self, now: Timestamp) -> bool {
-        let can_hear = self.is_heard && self.state != DeviceState::Lost && self.capabilities.is_none();
+    /// Somebody who may wants a gimbal to stop that is not known yet, or that starts again; true where it can be told.
+    pub(super) fn stop_unsteerable(&mut self, now: Timestamp) -> bool {
+        let can_hear = self.is_heard && self.state != DeviceState::Lost && !self.is_steerable();
         if can_hear {
-            if !self.may_be_turning() {
-                self.stop_when_heard();
+            // Nor is gone on with what may wait for it.
+            self.tracking.forget();
+            match self.rotation {
+                Some(_) => self.leave_turning(),
+                None => self.stop_when_heard(),
             }
             self.stop_what_was_left_turning(now);
         }
         can_hear
+    }
+
+    /// It is known to stand.
+    pub(super) fn forget_rotation(&mut self) {
+        (self.rotation, self.stop_unknown) = (None, None);
     }
 
     /// It may go on turning as it was told, and is not told anything for the time being.
@@ -113,7 +121,7 @@ impl GimbalManager {
     pub(super) fn rotation_due(&self) -> Option<Timestamp> {
         let rotation = self.rotation?;
         if rotation.is_left {
-            return self.stop_unknown.filter(|_| self.is_heard && self.capabilities.is_none());
+            return self.stop_unknown.filter(|_| self.is_heard && !self.is_steerable());
         }
         rotation.stopped.filter(|_| self.paused_by.is_none()).map(|at| at + STOPPED_AFTER)
     }

@@ -36,7 +36,7 @@ use crate::gimbals::mavlink_v2::MavlinkV2Driver;
 use crate::gimbals::mavlink_v2::packet::{DeviceInformation, read_information};
 use crate::gimbals::operation::{Operation, OperationId};
 use crate::gimbals::parameters::{Encoding, Known, ParameterOutput, Parameters};
-use crate::gimbals::report::{GimbalStatus, Identity, Report};
+use crate::gimbals::report::{GimbalStatus, Identity, Readiness, Report};
 use crate::gimbals::setpoint::{Setpoint, Turning};
 use crate::gimbals::settings::Family;
 use crate::timers::TimerTable;
@@ -53,6 +53,7 @@ use mount::Mount;
 use operations::Operations;
 use stopping::Stopping;
 use streams::Streams;
+use supervision::Off;
 use vehicle_turn::VehicleTurn;
 
 /// A gimbal not heard for so long is lost: five heartbeats.
@@ -69,9 +70,8 @@ pub struct GremsyDriver {
     is_alive: bool,
     /// That it is there was reported.
     is_reported: bool,
-    /// It was told to start again and has not been heard since.
-    is_booting: bool,
-    reboot_announced: Option<Timestamp>,
+    /// It was told to start again, or to switch itself off, and has not been heard since.
+    off: Option<Off>,
     begun: Timestamp,
     asked: u8,
     information: Option<DeviceInformation>,
@@ -97,6 +97,8 @@ pub struct GremsyDriver {
     stopping: Option<Stopping>,
     /// In v2, it is handed to its radio control when it has stopped.
     hand_over_waits: bool,
+    /// The last that was reported.
+    readiness: Option<Readiness>,
     /// That it starts was reported, or is no news.
     is_start_told: bool,
     /// Its radio receiver was given the gimbal.
@@ -145,8 +147,7 @@ impl GremsyDriver {
             device: None,
             is_alive: false,
             is_reported: false,
-            is_booting: false,
-            reboot_announced: None,
+            off: None,
             begun: Timestamp::ZERO,
             asked: 0,
             information: None,
@@ -164,6 +165,7 @@ impl GremsyDriver {
             turning: None,
             stopping: None,
             hand_over_waits: false,
+            readiness: None,
             is_start_told: true,
             is_handed_over: false,
             operations: Operations::default(),
@@ -226,7 +228,7 @@ impl GremsyDriver {
                 }
                 DriverOutput::Report(Report::Attitude(status)) => self.handle_device_status(now, status),
                 // While it is got to know it needs no second beginning.
-                DriverOutput::Report(Report::Restarted) if self.is_present && !self.is_booting => {
+                DriverOutput::Report(Report::Restarted) if self.is_present && self.off.is_none() => {
                     self.restart(now, device);
                 }
                 DriverOutput::Report(report @ Report::Malformed { .. })
@@ -248,6 +250,7 @@ impl GremsyDriver {
         self.drain_parameters();
         self.steer_on(now, device);
         self.handle_operations_timeout(now, device);
+        self.report_readiness();
     }
 }
 

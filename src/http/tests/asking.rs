@@ -247,6 +247,14 @@ fn what_is_not_done_has_its_status_and_its_reason() {
             503,
             json!({"error": "no gimbal was heard yet", "reason": "no_gimbal_yet"}),
         ),
+        (
+            refused(later("gimbal_starting"), None),
+            503,
+            json!({
+                "error": "the gimbal is starting; wait until it is ready, some 15 s, and ask again",
+                "reason": "gimbal_starting",
+            }),
+        ),
         (refused(failed("gimbal_lost"), None), 503, json!({"error": "gimbal lost", "reason": "gimbal_lost"})),
         (
             refused(Refusal::denied("cannot_retract"), None),

@@ -6,6 +6,7 @@
 mod bad_line;
 mod faults;
 mod operations;
+mod restarting;
 mod start_up;
 mod steering;
 mod stopping;
@@ -16,7 +17,7 @@ use std::time::Duration;
 use gimbald::bridge::Input;
 use gimbald::bridge::settings::Settings;
 use gimbald::bridge::snapshot::GimbalSnapshot;
-use gimbald::geometry::{Angle, YawFrame};
+use gimbald::geometry::{Angle, AngularRate, YawFrame};
 use gimbald::gimbals::gremsy::config::GremsySettings;
 use gimbald::gimbals::gremsy::driver;
 use gimbald::gimbals::gremsy::sim::{Device, DeviceSettings, Generation};
@@ -28,6 +29,7 @@ use gimbald::manager::request::AxisDemand;
 use gimbald::sim::plant::PlantSettings;
 use gimbald::sim::vehicle::{Vehicle, VehicleSettings};
 use gimbald::timestamp::Timestamp;
+use gimbald::wire::MavId;
 use gimbald::wire::dialect::{COMMAND_LONG_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA, PARAM_SET_DATA};
 use gimbald::wire::ids::command;
 

@@ -176,6 +176,13 @@ impl World {
         self.ends[place.0].peer.as_deref_mut().expect("somebody lives there")
     }
 
+    /// Somebody beside us on the line of the peer at a place says something to it.
+    pub fn tell_peer(&mut self, place: Place, bytes: &[u8]) {
+        let now = self.now;
+        self.peer(place).handle_received(now, bytes);
+        self.settle();
+    }
+
     /// Bytes from a place, as one read.
     pub fn send_bytes(&mut self, from: Place, bytes: &[u8]) {
         let channel = self.ends[from.0].channel;

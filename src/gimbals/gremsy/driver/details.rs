@@ -58,9 +58,9 @@ impl GremsyDriver {
     }
 
     fn stage(&self) -> &'static str {
-        if !self.is_alive {
+        if !self.is_alive || self.off.is_some_and(|off| !off.comes_back) {
             "searching"
-        } else if self.is_booting {
+        } else if self.off.is_some() {
             "restarting"
         } else if self.is_present {
             "running"

@@ -13,7 +13,7 @@ use crate::gimbals::gremsy::status::SystemStatus;
 use crate::gimbals::operation::{
     Motors, Operation, OperationError, OperationId, OperationResult, ResetMode, Restart, Stream, StreamRate, YawMode,
 };
-use crate::gimbals::report::Report;
+use crate::gimbals::report::Readiness;
 use crate::gimbals::setpoint::{Pointing, RadioControl, Setpoint, Stabilised};
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
@@ -30,8 +30,9 @@ const STOPS_WITHIN: std::time::Duration = std::time::Duration::from_secs(2);
 const MOTORS_SHOW_WITHIN: std::time::Duration = std::time::Duration::from_secs(5);
 const MODE_SHOWS_WITHIN: std::time::Duration = std::time::Duration::from_secs(3);
 
-/// A gimbal that says nothing more so soon after it was told to start again does so, also if it did not answer.
-const WENT_SILENT_WITHIN: std::time::Duration = std::time::Duration::from_millis(700);
+/// A gimbal that was told to start again or to switch itself off, did not answer, and says nothing any more has done it:
+/// otherwise it tells where it looks twenty times a second.
+const SILENT_WHEN_OFF: std::time::Duration = std::time::Duration::from_millis(300);
 
 /// A setpoint without an answer is said so often, 100 ms apart, when nobody repeats it.
 const POINT_SENDS: u8 = 3;
@@ -75,8 +76,7 @@ enum Goal {
     Motors { on: bool },
     Mode(YawMode),
     Rate(Stream, StreamRate),
-    Restart,
-    Shutdown,
+    Restart { comes_back: bool },
 }
 
 /// A direction of the driver's own that is said a few times.
@@ -96,6 +96,13 @@ impl Operations {
         });
         let held = self.held.iter().map(|held| held.until);
         shown.chain(self.pointing.map(|pointing| pointing.next)).chain(held).min()
+    }
+
+    /// Whether it was asked to start again or to switch itself off, and that is not settled.
+    pub fn restarts(&self) -> bool {
+        let is_waited_for = |pending: &Pending| matches!(pending.goal, Goal::Restart { .. });
+        self.held.iter().any(|held| matches!(held.operation, Operation::Restart(_)))
+            || self.pending.iter().any(is_waited_for)
     }
 
     /// Gives all of them up.
@@ -139,6 +146,14 @@ impl GremsyDriver {
     }
 
     fn begin_operation(&mut self, now: Timestamp, id: OperationId, device: MavId, operation: &Operation) {
+        let moves = matches!(
+            operation,
+            Operation::SetYawMode(_) | Operation::Mapping | Operation::Reset(_) | Operation::RadioControl
+        );
+        // One that is off hears nothing, and one that starts would do it when it has started.
+        if self.off.is_some() || moves && self.readiness() != Readiness::Ready {
+            return self.operated(id, Err(OperationError::NotReady));
+        }
         match operation {
             Operation::RefreshParameters => self.parameters.refresh_for(now, id),
             Operation::SetParameter { name, value } => self.parameters.set(now, id, &[(name, *value)]),
@@ -158,11 +173,11 @@ impl GremsyDriver {
                 self.ask(now, id, packet::hand_to_rc(device), Goal::Answer);
             }
             Operation::Restart(Restart::Reboot) => {
-                self.reboot_announced = Some(now);
-                self.ask(now, id, packet::reboot(device), Goal::Restart);
+                self.ask(now, id, packet::reboot(device), Goal::Restart { comes_back: true });
             }
             Operation::Restart(Restart::Shutdown) => {
-                self.ask(now, id, packet::reboot_or_shutdown(device, RebootAction::Shutdown), Goal::Shutdown);
+                let command = packet::reboot_or_shutdown(device, RebootAction::Shutdown);
+                self.ask(now, id, command, Goal::Restart { comes_back: false });
             }
             Operation::Motors(_) | Operation::SetYawMode(_) | Operation::Mapping | Operation::Reset(_) => {
                 match self.search.decided() {
@@ -281,14 +296,10 @@ impl GremsyDriver {
         // Said twice, it is sent once and answered for both.
         let (answered, rest) = self.operations.pending.drain(..).partition(is_its);
         self.operations.pending = rest;
-        for Pending { id, stage, goal } in answered {
-            let since = match stage {
-                Stage::Answer { since, .. } => since,
-                Stage::Shown { .. } => now,
-            };
+        for Pending { id, goal, .. } in answered {
             let result = match (goal, outcome) {
-                (Goal::Restart | Goal::Shutdown, CommandOutcome::Unanswered)
-                    if self.heard.latest.since(since) < WENT_SILENT_WITHIN =>
+                (Goal::Restart { .. }, CommandOutcome::Unanswered)
+                    if now.since(self.heard.latest) >= SILENT_WHEN_OFF =>
                 {
                     Ok(())
                 }
@@ -312,9 +323,8 @@ impl GremsyDriver {
                 return;
             }
             (Goal::Rate(stream, rate), Ok(())) => self.streams.choose(stream, rate),
-            (Goal::Restart, Ok(())) => self.await_reboot(now),
-            (Goal::Restart, Err(_)) => self.reboot_announced = None,
-            (Goal::Answer | Goal::Motors { .. } | Goal::Mode(_) | Goal::Rate(..) | Goal::Shutdown, _) => {}
+            (Goal::Restart { comes_back }, Ok(())) => self.switch_off(now, comes_back),
+            (Goal::Answer | Goal::Motors { .. } | Goal::Mode(_) | Goal::Rate(..) | Goal::Restart { .. }, _) => {}
         }
         self.operated(id, result);
     }
@@ -365,15 +375,15 @@ impl GremsyDriver {
         }
     }
 
-    /// It was told to start again and did: nothing that it was told before holds.
-    fn await_reboot(&mut self, now: Timestamp) {
-        self.reboot_announced = Some(now);
-        self.is_booting = true;
-        self.is_handed_over = false;
-        self.mount.handle_restart();
-        self.forget_rotation();
-        self.effect.forget();
-        self.outputs.push_back(DriverOutput::Report(Report::Restarted));
+    /// It starts again, or is lost: what moves it is not gone on with.
+    pub(super) fn end_moves(&mut self) {
+        self.is_retracted = false;
+        self.hand_over_waits = false;
+        let pointing = self.operations.pointing.take().map(|pointing| pointing.id);
+        let changing = self.mode_change.take().and_then(|change| change.asker());
+        for id in pointing.into_iter().chain(changing) {
+            self.operated(id, Err(OperationError::NoEffect("it has started again".to_owned())));
+        }
     }
 
     /// A new demand takes the place of a direction that is being said.

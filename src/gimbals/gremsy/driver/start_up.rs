@@ -28,10 +28,10 @@ impl GremsyDriver {
         self.information = None;
         self.aligned_since = None;
         self.is_present = false;
-        self.is_booting = false;
+        self.off = None;
         // To whoever steers, the first start is none of a gimbal that was there before.
         self.is_start_told = self.reported.is_none();
-        self.reboot_announced = None;
+        self.end_moves();
         self.stop_v2(now);
         self.heard.status = None;
         self.streams.forget_heard();
@@ -41,6 +41,7 @@ impl GremsyDriver {
         if let Some(generation) = self.search.decided() {
             self.set_streams(now, device, generation);
         }
+        self.report_readiness();
     }
 
     /// Its version, from whichever tells it.
@@ -97,7 +98,7 @@ impl GremsyDriver {
             }
         }
         let is_ready = self.search.decided().is_some() && self.parameters.is_settled() && self.aligned_since.is_some();
-        if is_ready && !self.is_present && !self.is_booting {
+        if is_ready && !self.is_present && self.off.is_none() {
             self.is_present = true;
             self.look_at_settings();
             if let Some(generation) = self.search.decided() {

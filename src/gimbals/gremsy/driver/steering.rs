@@ -12,6 +12,7 @@ use crate::gimbals::gremsy::modes::{self, ControlMode};
 use crate::gimbals::gremsy::packet;
 use crate::gimbals::gremsy::status::OperationState;
 use crate::gimbals::operation::{OperationError, YawMode};
+use crate::gimbals::report::Readiness;
 use crate::gimbals::setpoint::{Pointing, RadioControl, Setpoint, Stabilised, Turning};
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
@@ -92,7 +93,7 @@ impl GremsyDriver {
     }
 
     fn steer_v2(&mut self, now: Timestamp, setpoint: Setpoint, is_stop: bool) {
-        if !is_stop && (!self.is_present || self.is_booting) {
+        if !is_stop && self.readiness() == Readiness::Starting {
             return;
         }
         if let Setpoint::Point(Pointing { radio_control: RadioControl::Exclusive, .. }) = setpoint {
@@ -266,7 +267,7 @@ impl GremsyDriver {
     pub(super) fn condition(&self) -> Condition {
         Condition {
             is_heard: self.is_alive,
-            is_ready: self.is_alive && self.is_present && self.is_active && !self.is_booting,
+            is_ready: self.is_alive && self.is_present && self.is_active && self.off.is_none(),
             is_there: self.is_there(),
             motors_on: self.heard.status.is_some_and(|(_, status)| status.motors_on()),
         }

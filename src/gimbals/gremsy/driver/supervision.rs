@@ -7,7 +7,7 @@ use super::{GremsyDriver, Heard, LOST_AFTER, TICK, Timer, operations};
 use crate::gimbals::driver::DriverOutput;
 use crate::gimbals::gremsy::status::{Activity, SystemStatus};
 use crate::gimbals::operation::OperationError;
-use crate::gimbals::report::Report;
+use crate::gimbals::report::{Readiness, Report};
 use crate::timers::TimerTable;
 use crate::timestamp::Timestamp;
 use crate::wire::dialect::HEARTBEAT_DATA;
@@ -18,6 +18,8 @@ use crate::wire::{Frame, MavId};
 const REBOOT_TAKES_AT_MOST: Duration = Duration::from_secs(20);
 /// And what comes sooner after that is of before.
 const REBOOT_TAKES_AT_LEAST: Duration = Duration::from_secs(1);
+/// One that was silent for so long after it was told to start again has done so; others were never off.
+const REBOOT_IS_SILENT_FOR: Duration = Duration::from_secs(3);
 
 /// A gimbal should have become ready by then, or at least have told its status.
 const READY_WITHIN: Duration = Duration::from_secs(20);
@@ -26,19 +28,51 @@ const STATUS_WITHIN: Duration = Duration::from_secs(10);
 /// A time since boot that jumps back further means that the device was restarted.
 const REBOOT_STEP_MS: u32 = 1_000;
 
+/// It was told to start again, or to switch itself off, and did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Off {
+    since: Timestamp,
+    /// It starts again.
+    pub comes_back: bool,
+}
+
 impl GremsyDriver {
     /// It was started again, by whomever.
     pub(super) fn restart(&mut self, now: Timestamp, device: MavId) {
         self.mount.handle_restart();
-        self.mode_change = None;
-        self.is_retracted = false;
         self.is_handed_over = false;
         self.effect.forget();
         self.heard.boot_ms = None;
+        self.begin(now, device);
         if self.is_reported {
             self.outputs.push_back(DriverOutput::Report(Report::Restarted));
         }
-        self.begin(now, device);
+    }
+
+    /// It does what it was told, and nothing that it was told before holds.
+    pub(super) fn switch_off(&mut self, now: Timestamp, comes_back: bool) {
+        self.off = Some(Off { since: now, comes_back });
+        self.is_handed_over = false;
+        self.mount.handle_lost();
+        self.end_moves();
+        self.forget_rotation();
+        self.effect.forget();
+    }
+
+    /// Whether it can be steered, and if not, what it is waited for.
+    pub(super) fn readiness(&self) -> Readiness {
+        match self.off {
+            None if self.is_present && self.operations.restarts() => Readiness::AskedToRestart,
+            None if self.is_present => Readiness::Ready,
+            _ => Readiness::Starting,
+        }
+    }
+
+    pub(super) fn report_readiness(&mut self) {
+        let readiness = self.readiness();
+        if self.readiness.replace(readiness) != Some(readiness) {
+            self.outputs.push_back(DriverOutput::Report(Report::Readiness(readiness)));
+        }
     }
 
     /// It has started again, and nothing of before turns it.
@@ -48,7 +82,7 @@ impl GremsyDriver {
     }
 
     pub(super) fn handle_heard(&mut self, now: Timestamp, device: MavId) {
-        self.heard.latest = now;
+        let silent = now.since(std::mem::replace(&mut self.heard.latest, now));
         self.timers.set(Timer::Lost, now + LOST_AFTER);
         if !self.is_alive {
             self.is_alive = true;
@@ -56,10 +90,13 @@ impl GremsyDriver {
             if self.search.decided().is_some() {
                 self.report_alive(device);
             }
-        } else if self.is_booting && self.reboot_announced.is_some_and(|at| now.since(at) > REBOOT_TAKES_AT_LEAST) {
-            // Of that it was told already.
-            self.begin(now, device);
-            self.is_start_told = true;
+        } else if self.off.is_some_and(|off| now.since(off.since) > REBOOT_TAKES_AT_LEAST) {
+            if silent >= REBOOT_IS_SILENT_FOR {
+                self.restart(now, device);
+                self.is_start_told = true;
+            } else {
+                self.begin(now, device);
+            }
         }
     }
 
@@ -71,11 +108,10 @@ impl GremsyDriver {
     }
 
     pub(super) fn lose(&mut self, now: Timestamp) {
-        if let Some(announced) = self.reboot_announced
-            && self.is_booting
-            && now.since(announced) < REBOOT_TAKES_AT_MOST
+        if let Some(Off { since, comes_back: true }) = self.off
+            && now.since(since) < REBOOT_TAKES_AT_MOST
         {
-            self.timers.set(Timer::Lost, announced + REBOOT_TAKES_AT_MOST);
+            self.timers.set(Timer::Lost, since + REBOOT_TAKES_AT_MOST);
             return;
         }
         // One that is gone before it was known has been there all the same, and another may take its place.
@@ -89,12 +125,10 @@ impl GremsyDriver {
     pub(super) fn forget_conversation(&mut self) {
         self.is_alive = false;
         self.is_reported = false;
-        self.is_booting = false;
+        self.off = None;
         self.is_present = false;
-        self.reboot_announced = None;
         self.mount.handle_lost();
-        self.mode_change = None;
-        self.is_retracted = false;
+        self.end_moves();
         self.is_handed_over = false;
         self.effect.forget();
         self.heard = Heard::default();
@@ -115,19 +149,21 @@ impl GremsyDriver {
     }
 
     pub(super) fn handle_status(&mut self, now: Timestamp, device: MavId, status: SystemStatus) {
-        let was_running = self.is_present && !self.is_booting;
+        let was_running = self.is_present && self.off.is_none();
         self.heard.status = Some((now, status));
         // What it was told since it is heard again, to stop and stay, was told to one that hangs without motors.
         if status.activity.contains(Activity::STARTING_UP) && !std::mem::replace(&mut self.is_start_told, true) {
             self.outputs.push_back(DriverOutput::Report(Report::Restarted));
             self.mount.handle_lost();
         }
-        if status.activity.contains(Activity::STARTING_UP) {
-            self.forget_rotation();
-        }
         if was_running && status.activity.contains(Activity::STARTING_UP) {
             self.restart(now, device);
+            self.is_start_told = true;
             self.heard.status = Some((now, status));
+        }
+        if status.activity.contains(Activity::STARTING_UP) {
+            self.forget_rotation();
+            self.outputs.push_back(DriverOutput::Report(Report::Stands));
         }
         if status.is_aligned() {
             self.aligned_since.get_or_insert(now);
@@ -155,7 +191,7 @@ impl GremsyDriver {
 
     pub(super) fn tick(&mut self, now: Timestamp, device: MavId) {
         self.timers.set(Timer::Tick, now + TICK);
-        if self.is_booting {
+        if self.off.is_some() {
             return;
         }
         if self.search.decided().is_some() && self.streams.is_silent(now) {
