@@ -188,7 +188,8 @@ pub struct GimbalManager {
     /// The autopilot as far as it drives the gimbal as a device of its own.
     autopilot_client: AutopilotClient,
     mount_senders: MountSenders,
-    paused_by: Option<asked::Pause>,
+    /// Those under way; it is paused while there are any. Few, because few things are done at once.
+    pauses: Vec<asked::Pause>,
     /// Whose commands of which number are being done by the gimbal.
     commanded: Vec<(MavId, u16)>,
     next_command: u64,
@@ -230,7 +231,7 @@ impl GimbalManager {
             last_command: None,
             autopilot_client: AutopilotClient::default(),
             mount_senders: MountSenders::default(),
-            paused_by: None,
+            pauses: Vec::new(),
             commanded: Vec::new(),
             next_command: 0,
             rejected: BTreeMap::new(),
@@ -352,7 +353,7 @@ impl GimbalManager {
         // Without a device there is nothing to tell of.
         let schedules = schedules.into_iter().flatten().filter(|_| self.device.is_some());
         let lease = self.rules.lease_timeout;
-        let tracking = self.tracking.poll_timeout().filter(|_| self.paused_by.is_none() && self.readiness.is_ready());
+        let tracking = self.tracking.poll_timeout().filter(|_| self.pauses.is_empty() && self.readiness.is_ready());
         let control = self.control.poll_timeout(lease);
         let rest =
             [tracking, control, self.source_lost_at(), self.rotation_due(), self.autopilot_client.poll_timeout()];
@@ -456,8 +457,7 @@ impl GimbalManager {
             let who = self.tracking.source();
             self.tell(if roi.is_some() { Event::RoiStarted { who } } else { Event::RoiEnded { who } });
         }
-        if let Some(capabilities) = self.capabilities.filter(|_| self.paused_by.is_none() && self.readiness.is_ready())
-        {
+        if let Some(capabilities) = self.capabilities.filter(|_| self.pauses.is_empty() && self.readiness.is_ready()) {
             let situation = self.situation(now, &capabilities, around);
             if let Some(setpoint) = self.tracking.steer(now, &situation) {
                 self.outputs.push_back(ManagerOutput::Steer(setpoint));

@@ -253,23 +253,24 @@ impl GimbalManager {
         }
         if operation.needs_control() {
             self.last_command = None;
-            self.note_demand(now, who);
             self.tell(Event::Operated { who, operation: operation.clone(), before: None });
         }
         if operation.ends_demand() {
+            self.note_obeyed(now, who);
             if self.tracking.stop_rates(now) {
                 self.carry_out(now, around);
             }
-            self.paused_by = Some(Pause { id, hands_over: *operation == Operation::RadioControl });
+            self.pauses.push(Pause { id, hands_over: *operation == Operation::RadioControl });
         }
         self.outputs.push_back(ManagerOutput::Operate { id, operation: operation.clone() });
         Ok(Progress::UnderWay)
     }
 
-    /// What became of an operation. One that was done has taken the place of what the gimbal was told before; after one
-    /// that was not it goes on with that.
+    /// What became of an operation. One that was done has taken the place of what the gimbal was told before; after those
+    /// that were not it goes on with that.
     pub fn handle_operated(&mut self, now: Timestamp, id: OperationId, is_done: bool, around: Surroundings<'_>) {
-        let Some(pause) = self.paused_by.take_if(|pause| pause.id == id) else { return };
+        let Some(at) = self.pauses.iter().position(|pause| pause.id == id) else { return };
+        let pause = self.pauses.swap_remove(at);
         match (is_done, pause.hands_over) {
             (true, true) => self.tracking.leave_to_radio_control(),
             (true, false) => self.tracking.forget(),

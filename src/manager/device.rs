@@ -19,7 +19,7 @@ impl GimbalManager {
             self.last_command = None;
         }
         if matches!(report, Report::Restarted | Report::AnotherFamily | Report::Lost) {
-            self.paused_by = None;
+            self.pauses.clear();
         }
         match report {
             Report::Restarted => {
@@ -31,7 +31,7 @@ impl GimbalManager {
             }
             Report::Readiness(readiness) => {
                 if readiness == Readiness::Starting {
-                    self.paused_by = None;
+                    self.pauses.clear();
                     self.forget_demand(now);
                 }
                 if self.readiness.handle(readiness) {

@@ -61,10 +61,15 @@ impl GimbalManager {
         self.control.gate(sender, silent, self.policy(around))
     }
 
-    /// `sender` was obeyed.
+    /// A demand of `sender` was obeyed.
     pub(super) fn note_demand(&mut self, now: Timestamp, sender: MavId) {
         self.source_heard = now;
-        self.paused_by = None;
+        self.pauses.clear();
+        self.note_obeyed(now, sender);
+    }
+
+    /// The same where it was something else than a demand, in whose place it comes.
+    pub(super) fn note_obeyed(&mut self, now: Timestamp, sender: MavId) {
         self.autopilot_client.handle_obeyed(now, sender);
         if self.control.primary() == Some(sender) {
             self.primary_demand = Some(now);

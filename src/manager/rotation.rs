@@ -123,6 +123,6 @@ impl GimbalManager {
         if rotation.is_left {
             return self.stop_unknown.filter(|_| self.is_heard && !self.is_steerable());
         }
-        rotation.stopped.filter(|_| self.paused_by.is_none()).map(|at| at + STOPPED_AFTER)
+        rotation.stopped.filter(|_| self.pauses.is_empty()).map(|at| at + STOPPED_AFTER)
     }
 }

@@ -50,6 +50,33 @@ fn motors_off_and_on() {
     }
 }
 
+/// The motors stay off whatever else is asked while they are being switched off: a parameter, or the same once more. Where it was told to look before is not said again.
+#[test]
+fn what_is_asked_meanwhile_does_not_undo_an_operation() {
+    let parameter = Operation::SetParameter { name: "GYRO_LPF".to_owned(), value: 6.0 };
+    for meanwhile in [parameter, Operation::Motors(Motors::Off), Operation::SetCombinedAttitude(true)] {
+        for generation in [Generation::V1, Generation::V2] {
+            let (mut world, places) = controlled(generation);
+            point(&mut world, -30.0, 20.0);
+            run(&mut world, places, 5 * SECOND);
+            world.forget();
+            let off = Asked::Operation(Operation::Motors(Motors::Off));
+            world.input(Input::Asked { id: OperationId(1), gimbal: "camera", asked: &off });
+            let meanwhile = Asked::Operation(meanwhile.clone());
+            world.input(Input::Asked { id: OperationId(2), gimbal: "camera", asked: &meanwhile });
+
+            run(&mut world, places, 8 * SECOND);
+
+            assert_eq!(seen(&world).details.motors_on, Some(false), "{generation:?} {meanwhile:?}");
+            assert_eq!(seen(&world).setpoint, None, "{generation:?} {meanwhile:?}");
+            let (commands, setpoints) = orders(&mut world, places);
+            assert!(commands.iter().all(|command| *command == packet::set_motors(GIMBAL, false)), "{commands:?}");
+            let retracts = |setpoint: &GIMBAL_DEVICE_SET_ATTITUDE_DATA| setpoint.flags & 1 != 0;
+            assert!(setpoints.iter().all(retracts), "{generation:?} {meanwhile:?}: {setpoints:?}");
+        }
+    }
+}
+
 /// `set_gimbal_lock_mode_sync`, `set_gimbal_follow_mode_sync`: 31011 in v1; in v2 flags until 285 shows them.
 #[test]
 fn lock_and_follow() {

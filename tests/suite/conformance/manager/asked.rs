@@ -14,15 +14,17 @@ use gimbald::manager::request::{AxisDemand, Refusal};
 use gimbald::manager::roi::Datum;
 use gimbald::manager::settings::ControlSettings;
 use gimbald::wire::MavId;
+use gimbald::wire::dialect::MavMessage;
 
 use super::{
     FIELD, SECOND, fly, look, only_setpoint, run_flying, run_looking, setpoints, told_control, with_gimbal,
     with_gimbal_that,
 };
 use crate::support::script::{
-    ACCEPTED, DENIED, NAN, configure, ground_heartbeat, pitch_yaw_deg, pitchyaw, take_control, usual_capabilities,
+    ACCEPTED, DENIED, NAN, configure, device_status, ground_heartbeat, pitch_yaw_deg, pitchyaw, take_control,
+    usual_capabilities,
 };
-use crate::support::world::{GCS, MANAGER, World, three_links};
+use crate::support::world::{GCS, GIMBAL, MANAGER, World, three_links};
 
 const NAME: &str = "gimbal-154";
 const NOBODY: MavId = MavId::new(0, 0);
@@ -313,6 +315,24 @@ fn who_is_not_there_does_nothing() {
     assert_eq!(ask(&mut world, &down_to_the_right()), later("no_gimbal_yet"));
     assert_eq!(ask(&mut world, &refresh), Err(NotDone::Operation(OperationError::NotThere)));
     assert_eq!(ask(&mut world, &Asked::TakeControl), Ok(()), "as by CONFIGURE");
+}
+
+/// What somebody else sets is no sign of who turns the gimbal: a rotation ends with the lease of who asked for it, however long
+/// a rate may last.
+#[test]
+fn settings_do_not_keep_the_rotation_of_a_silent_sender_alive() {
+    let control = ControlSettings { command_rate_timeout: Duration::ZERO, ..ControlSettings::default() };
+    let (mut world, places) = with_gimbal_that(usual_capabilities(), Settings { control, ..three_links() });
+    assert_eq!(world.result_of(places.ground, GCS, &pitchyaw(NAN, NAN, 0.0, 5.0, 44.0)), Some(ACCEPTED));
+    for second in 0..12 {
+        let mode = world.snapshot().gimbals[0].setpoint.as_ref().expect("it was told").mode.clone();
+        assert_eq!(mode == "rate", second < 10, "{mode} after {second} s");
+        let set = Asked::Operation(Operation::SetParameter { name: "GYRO_LPF".to_owned(), value: 6.0 });
+        assert_eq!(ask(&mut world, &set), Err(NotDone::Operation(OperationError::Unsupported)));
+        let status = device_status(world.now, 44, 0.0, 0.0);
+        let status = MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status);
+        world.run_with(SECOND, &[(SECOND / 10, places.gimbal, GIMBAL, status)]);
+    }
 }
 
 /// A place that waits for a gimbal, and is told of nowhere, has no name; and before the system id is settled nothing is
