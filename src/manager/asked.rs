@@ -7,7 +7,7 @@
 use super::control::Voice;
 use super::events::Event;
 use super::request::{AxisDemand, Claim, Configure, Demand, DemandKind, Refusal};
-use super::roi::Datum;
+use super::roi::{Datum, position};
 use super::{DeviceState, GimbalManager, ManagerOutput, Surroundings, control};
 use crate::geometry::{AngularRate, YawFrame};
 use crate::gimbals::operation::{Motors, Operation, OperationError, OperationId, Restart};
@@ -187,7 +187,8 @@ impl GimbalManager {
             Asked::Follow => self.stay(now, who, voice, Some(YawFrame::Vehicle), around),
             Asked::LookAt { latitude_deg, longitude_deg, altitude_m, datum } => {
                 voice.needs_whole()?;
-                self.look_at_place(now, who, [*latitude_deg, *longitude_deg], *altitude_m, *datum, around)
+                let place = position(now, [*latitude_deg, *longitude_deg], *altitude_m, *datum, around)?;
+                self.look_at_place(now, who, place, around)
             }
             Asked::EndRoi => {
                 voice.needs_whole()?;

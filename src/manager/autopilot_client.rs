@@ -214,7 +214,8 @@ impl GimbalManager {
             let is_obeyed = self.tracking.source() == Some(autopilot) && self.tracking.roi().is_some();
             return if is_obeyed { Ok(()) } else { Err(Refusal::denied("overruled")) };
         }
-        self.steerable()?;
+        // Control is not borrowed for what cannot be done.
+        self.check_roi_location(now, asked, around)?;
         self.take_for_autopilot(now, autopilot, around)?;
         self.autopilot_client.stream.note_command(now);
         self.do_set_roi_location(now, autopilot, asked, around)?;

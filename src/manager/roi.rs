@@ -32,6 +32,34 @@ impl GimbalManager {
         command: &Command,
         around: Surroundings<'_>,
     ) -> Result<(), Refusal> {
+        match self.read_roi_location(now, command, around)? {
+            Some(place) => self.look_at_place(now, sender, place, around),
+            None => self.do_set_roi_none(now, sender),
+        }
+    }
+
+    /// Whether [`do_set_roi_location`](Self::do_set_roi_location) can be done at this moment.
+    pub(super) fn check_roi_location(
+        &self,
+        now: Timestamp,
+        command: &Command,
+        around: Surroundings<'_>,
+    ) -> Result<(), Refusal> {
+        let place = self.read_roi_location(now, command, around)?;
+        let capabilities = self.steerable()?;
+        match place {
+            Some(_) => self.tracking.check_place(&self.situation(now, capabilities, around)),
+            None => Ok(()),
+        }
+    }
+
+    /// The place that a command names; `None` where it is the end of looking at one.
+    fn read_roi_location(
+        &self,
+        now: Timestamp,
+        command: &Command,
+        around: Surroundings<'_>,
+    ) -> Result<Option<Position>, Refusal> {
         let datum = match command.form {
             Form::Int { frame: mav_frame::GLOBAL | mav_frame::GLOBAL_INT, .. } => Datum::MeanSeaLevel,
             Form::Int { frame: mav_frame::GLOBAL_RELATIVE_ALT | mav_frame::GLOBAL_RELATIVE_ALT_INT, .. } => Datum::Home,
@@ -50,7 +78,7 @@ impl GimbalManager {
             Form::Long => [command.finite(5)?, command.finite(6)?].map(|degrees| degrees.map(f64::from)),
         };
         command.check_integers()?;
-        self.look_at(now, sender, coordinates, command.finite(7)?, datum, around)
+        place(now, coordinates, command.finite(7)?, datum, around)
     }
 
     pub(super) fn do_set_roi_none(&mut self, now: Timestamp, sender: MavId) -> Result<(), Refusal> {
@@ -87,41 +115,60 @@ impl GimbalManager {
         datum: Datum,
         around: Surroundings<'_>,
     ) -> Result<(), Refusal> {
-        let no_such_place = Refusal::denied("no_such_place");
-        let ([Some(latitude_deg), Some(longitude_deg)], Some(altitude)) = (coordinates, altitude.map(f64::from)) else {
-            return Err(no_such_place);
-        };
-        if (latitude_deg, longitude_deg, altitude) == (0.0, 0.0, 0.0) {
-            return self.do_set_roi_none(now, sender);
+        match place(now, coordinates, altitude, datum, around)? {
+            Some(place) => self.look_at_place(now, sender, place, around),
+            None => self.do_set_roi_none(now, sender),
         }
-        self.look_at_place(now, sender, [latitude_deg, longitude_deg], altitude, datum, around)
     }
 
-    /// Looks at a place; degrees, and metres above `datum`.
     pub(super) fn look_at_place(
         &mut self,
         now: Timestamp,
         sender: MavId,
-        [latitude_deg, longitude_deg]: [f64; 2],
-        altitude: f64,
-        datum: Datum,
+        place: Position,
         around: Surroundings<'_>,
     ) -> Result<(), Refusal> {
-        let no_such_place = Refusal::denied("no_such_place");
-        if latitude_deg.abs() > 90.0 || longitude_deg.abs() > 180.0 || altitude.abs() > FURTHEST_ALTITUDE {
-            return Err(no_such_place);
-        }
-        let datum_amsl = match datum {
-            Datum::MeanSeaLevel => 0.0,
-            Datum::Home => around.vehicle.home_altitude_amsl(now).ok_or(Refusal::later("no_home_altitude"))?,
-        };
         let capabilities = *self.steerable()?;
         let situation = self.situation(now, &capabilities, around);
-        let place = Position { latitude_deg, longitude_deg, altitude_m: altitude + datum_amsl };
         self.tracking.point_at(now, sender, place, &situation)?;
         self.note_demand(now, sender);
         Ok(())
     }
+}
+
+/// The place at these degrees and metres; `None` where they name none, but the end of looking at one.
+fn place(
+    now: Timestamp,
+    coordinates: [Option<f64>; 2],
+    altitude: Option<f32>,
+    datum: Datum,
+    around: Surroundings<'_>,
+) -> Result<Option<Position>, Refusal> {
+    match (coordinates, altitude.map(f64::from)) {
+        ([Some(0.0), Some(0.0)], Some(0.0)) => Ok(None),
+        ([Some(latitude_deg), Some(longitude_deg)], Some(altitude)) => {
+            position(now, [latitude_deg, longitude_deg], altitude, datum, around).map(Some)
+        }
+        _ => Err(Refusal::denied("no_such_place")),
+    }
+}
+
+/// The place at these degrees, so many metres above `datum`.
+pub(super) fn position(
+    now: Timestamp,
+    [latitude_deg, longitude_deg]: [f64; 2],
+    altitude: f64,
+    datum: Datum,
+    around: Surroundings<'_>,
+) -> Result<Position, Refusal> {
+    if latitude_deg.abs() > 90.0 || longitude_deg.abs() > 180.0 || altitude.abs() > FURTHEST_ALTITUDE {
+        return Err(Refusal::denied("no_such_place"));
+    }
+    let datum_amsl = match datum {
+        Datum::MeanSeaLevel => 0.0,
+        Datum::Home => around.vehicle.home_altitude_amsl(now).ok_or(Refusal::later("no_home_altitude"))?,
+    };
+    Ok(Position { latitude_deg, longitude_deg, altitude_m: altitude + datum_amsl })
 }
 
 /// A coordinate in units of 1e-7 degrees; the largest number is none.

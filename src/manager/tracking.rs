@@ -116,15 +116,20 @@ impl Tracking {
         place: Position,
         situation: &Situation<'_>,
     ) -> Result<(), Refusal> {
-        if situation.position.is_none() {
-            return Err(Refusal::later("no_vehicle_position"));
-        }
-        self.need_frame(YawFrame::Earth, situation)?;
+        self.check_place(situation)?;
         let aim = Aim::Roi(Roi::new(place));
         self.change_hands(now, &aim, situation)?;
         self.begin(now, source, aim);
         self.nudge.handle_absolute(now, true, true);
         Ok(())
+    }
+
+    /// Whether enough is known to look at a place.
+    pub fn check_place(&self, situation: &Situation<'_>) -> Result<(), Refusal> {
+        if situation.position.is_none() {
+            return Err(Refusal::later("no_vehicle_position"));
+        }
+        self.need_frame(YawFrame::Earth, situation)
     }
 
     /// Keeps the direction that the gimbal was told, or else has, yaw in `frame`.

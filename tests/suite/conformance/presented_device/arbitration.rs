@@ -12,8 +12,9 @@ use proptest::prelude::*;
 
 use super::{PERIOD, SECOND, introduce, presenting, setpoint, turning, with_device};
 use crate::support::script::{
-    ACCEPTED, DENIED, NAN, ardupilot_heartbeat, autopilot_state, command_int, configure, device_status,
-    gimbal_heartbeat, global_position, ground_heartbeat, of, pitch_yaw_deg, pitchyaw, take_control, usual_capabilities,
+    ACCEPTED, DENIED, NAN, TEMPORARILY_REJECTED, ardupilot_heartbeat, autopilot_state, command_int, configure,
+    device_status, gimbal_heartbeat, global_position, ground_heartbeat, of, pitch_yaw_deg, pitchyaw, take_control,
+    usual_capabilities,
 };
 use crate::support::world::{AUTOPILOT, GCS, GIMBAL, Places, World};
 
@@ -364,6 +365,25 @@ fn a_place_named_to_the_device_is_looked_at() {
     // Nobody else names places to the device.
     let from_station = flight.world.ask(flight.places.autopilot, GCS, &north);
     assert_eq!(of::<COMMAND_ACK_DATA>(&from_station)[0].result, 3);
+}
+
+/// Control is not borrowed for a place that cannot be looked at: whoever has it keeps it, and goes on turning.
+#[test]
+fn a_place_that_cannot_be_looked_at_borrows_nothing() {
+    const UNSUPPORTED_MAV_FRAME: u8 = 9;
+    let roi = |frame| crate::support::script::in_frame(frame, command_int(GIMBAL, 195, [0.0; 4], 1, 80_000_000, 400.0));
+    // Nobody has told where the vehicle is, and the second frame is none that counts from the ground or from the sea.
+    for (frame, expected) in [(0, TEMPORARILY_REJECTED), (8, UNSUPPORTED_MAV_FRAME)] {
+        let mut flight = Flight::new(presenting());
+        assert_eq!(flight.command(&take_control()), Some(ACCEPTED));
+        assert_eq!(flight.command(&pitchyaw(NAN, NAN, 0.0, 5.0, 44.0)), Some(ACCEPTED));
+        let acks: Vec<COMMAND_ACK_DATA> = of(&flight.world.ask(flight.places.autopilot, AUTOPILOT, &roi(frame)));
+        assert_eq!(acks.iter().map(|ack| ack.result).collect::<Vec<_>>(), [expected]);
+        assert_eq!(flight.holders(), (station(), None));
+        flight.run(SECOND);
+        let setpoint = flight.world.snapshot().gimbals[0].setpoint.clone().expect("it turns");
+        assert_eq!((setpoint.mode.as_str(), setpoint.source), ("rate", station()));
+    }
 }
 
 /// PX4 with `MNT_MODE_OUT` 2 drives a device as well, and in its own way: 283 is asked of everybody, 284 comes to no component
