@@ -14,7 +14,6 @@ use super::details::GimbalDetails;
 use super::driver::{CommandOutcome, DriverOutput, GimbalDriver};
 use super::families;
 use super::gremsy;
-use super::gremsy::parameters::ParameterTable;
 use super::mavlink_v2::{MavlinkV2Driver, packet};
 use super::operation::{Operation, OperationId};
 use super::report::Report;
@@ -22,7 +21,7 @@ use super::setpoint::{Setpoint, Turning};
 use super::settings::{Family, GimbalSettings};
 use crate::timers::TimerTable;
 use crate::timestamp::Timestamp;
-use crate::wire::dialect::{COMMAND_LONG_DATA, CharArray, MavMessage, PARAM_REQUEST_READ_DATA, PARAM_VALUE_DATA};
+use crate::wire::dialect::COMMAND_LONG_DATA;
 use crate::wire::ids::message;
 use crate::wire::{Frame, MavId};
 
@@ -140,7 +139,7 @@ impl Detection {
     fn weigh(&mut self, now: Timestamp, frame: &Frame<'_>) {
         // One of these speaks both v1 and v2, and says by 283 that it is one.
         if self.family() == Family::Gremsy {
-            if frame.message_id() == message::GIMBAL_DEVICE_INFORMATION && is_of_another(frame) {
+            if frame.message_id() == message::GIMBAL_DEVICE_INFORMATION && gremsy::is_denied_by(frame) {
                 self.evidence.v2 = true;
                 self.take(now, Family::MavlinkV2);
             }
@@ -156,10 +155,8 @@ impl Detection {
             message::HEARTBEAT if self.family() == Family::MavlinkV1 => {
                 self.timers.set_no_later(Timer::AskParameters, now + ASK_PARAMETERS_AGAIN_EVERY);
             }
-            message::PARAM_VALUE if !self.evidence.v2 && is_parameter_of_gremsy(frame) => {
-                self.take(now, Family::Gremsy)
-            }
-            message::GIMBAL_DEVICE_INFORMATION if is_of_gremsy(frame) => self.take(now, Family::Gremsy),
+            message::PARAM_VALUE if !self.evidence.v2 && gremsy::is_known_by(frame) => self.take(now, Family::Gremsy),
+            message::GIMBAL_DEVICE_INFORMATION if gremsy::is_known_by(frame) => self.take(now, Family::Gremsy),
             message::GIMBAL_DEVICE_INFORMATION | message::GIMBAL_DEVICE_ATTITUDE_STATUS
                 if (!self.evidence.v2 || self.other.is_some()) && is_of_v2(frame) =>
             {
@@ -180,15 +177,8 @@ impl Detection {
 
     fn ask_parameters(&mut self, now: Timestamp) {
         let Some(device) = self.device else { return };
-        for name in ParameterTable::TELLING_NAMES {
-            let question = MavMessage::PARAM_REQUEST_READ(PARAM_REQUEST_READ_DATA {
-                param_index: -1,
-                target_system: device.system,
-                target_component: device.component,
-                param_id: CharArray::from(name),
-            });
-            self.outputs.push_back(DriverOutput::Message(Box::new(question)));
-        }
+        let questions = gremsy::telling_questions(device);
+        self.outputs.extend(questions.map(|question| DriverOutput::Message(Box::new(question))));
         self.evidence.questions = self.evidence.questions.saturating_add(1);
         if self.family() == Family::MavlinkV1 {
             self.timers.set(Timer::AskParameters, now + ASK_PARAMETERS_AGAIN_EVERY);
@@ -314,26 +304,6 @@ impl GimbalDriver for Detection {
     fn details(&self, now: Timestamp) -> GimbalDetails {
         self.other.as_ref().map_or_else(|| self.v2.details(now), |other| other.details(now))
     }
-}
-
-/// Whether a v2 device says that Gremsy made it.
-fn is_of_gremsy(frame: &Frame<'_>) -> bool {
-    let information = packet::read_information(frame).filter(|information| information.gimbal_device_id == 0);
-    information.is_some_and(|information| gremsy::is_vendor(&information.identity.vendor))
-}
-
-/// Whether a v2 device says that somebody else made it.
-fn is_of_another(frame: &Frame<'_>) -> bool {
-    let information = packet::read_information(frame).filter(|information| information.gimbal_device_id == 0);
-    let vendor = information.map(|information| information.identity.vendor).filter(|vendor| !vendor.is_empty());
-    vendor.is_some_and(|vendor| !gremsy::is_vendor(&vendor))
-}
-
-/// Whether only a Gremsy has the parameter.
-fn is_parameter_of_gremsy(frame: &Frame<'_>) -> bool {
-    let value = frame.decode::<PARAM_VALUE_DATA>();
-    let name = value.as_ref().and_then(|value| value.param_id.to_str().ok());
-    ParameterTable::recognised_by(name).is_some()
 }
 
 /// Whether only a v2 device says that of itself.

@@ -28,11 +28,20 @@ pub fn is_vendor(vendor: &str) -> bool {
 
 /// Whether by that frame a gimbal says that it is a Gremsy: by its maker's name, or by a parameter that only a Gremsy has.
 pub fn is_known_by(frame: &Frame<'_>) -> bool {
-    let information = read_information(frame).filter(|information| information.gimbal_device_id == 0);
     let value = frame.decode::<PARAM_VALUE_DATA>();
     let name = value.as_ref().and_then(|value| value.param_id.to_str().ok());
-    information.is_some_and(|information| is_vendor(&information.identity.vendor))
-        || ParameterTable::recognised_by(name).is_some()
+    vendor(frame).is_some_and(|vendor| is_vendor(&vendor)) || ParameterTable::recognised_by(name).is_some()
+}
+
+/// Whether by that frame a gimbal says that somebody else made it.
+pub fn is_denied_by(frame: &Frame<'_>) -> bool {
+    vendor(frame).is_some_and(|vendor| !vendor.is_empty() && !is_vendor(&vendor))
+}
+
+/// Who made it, as a v2 device says of itself.
+fn vendor(frame: &Frame<'_>) -> Option<String> {
+    let information = read_information(frame).filter(|information| information.gimbal_device_id == 0)?;
+    Some(information.identity.vendor)
 }
 
 /// Asks a gimbal for parameters that only a Gremsy has.
