@@ -1,6 +1,7 @@
 //! Gimbals behind one driver trait, a folder per family.
 
 pub mod adapt;
+pub mod boot_clock;
 pub mod capabilities;
 pub mod details;
 pub mod detection;

@@ -27,6 +27,7 @@ use std::time::Duration;
 use super::config::GremsySettings;
 use super::readings::{Encoders, Negated, Orientation, RawImu};
 use super::status::{SystemStatus, read_system_status};
+use crate::gimbals::boot_clock::BootClock;
 use crate::gimbals::capabilities::Capabilities;
 use crate::gimbals::details::GimbalDetails;
 use crate::gimbals::driver::{CommandOutcome, DriverOutput, GimbalDriver};
@@ -126,7 +127,7 @@ struct Heard {
     attitude: Option<(Timestamp, GimbalStatus)>,
     device_status: Option<Timestamp>,
     information: Option<Timestamp>,
-    boot_ms: Option<u32>,
+    clock: BootClock,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

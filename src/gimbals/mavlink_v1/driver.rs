@@ -5,12 +5,12 @@
 //! that, or will not.
 
 use std::collections::VecDeque;
-use std::ops::Range;
 use std::time::Duration;
 
 use super::config::{V1RadioControl, V1Settings};
 use super::packet::{self, MountControl};
 use crate::geometry::{Angle, AngularRate, Attitude, AxisLimits, GimbalAngles, Limits, VehicleFrame};
+use crate::gimbals::boot_clock::BootClock;
 use crate::gimbals::capabilities::Capabilities;
 use crate::gimbals::details::GimbalDetails;
 use crate::gimbals::driver::{CommandOutcome, DriverOutput, GimbalDriver};
@@ -32,10 +32,6 @@ pub const LOST_AFTER: Duration = Duration::from_secs(5);
 const REPEAT_EVERY: Duration = Duration::from_millis(500);
 /// And no setpoint is sent sooner after another.
 const LEAST_INTERVAL: Duration = Duration::from_millis(20);
-
-/// A time since boot that jumps back so far, in milliseconds, means that the gimbal was restarted; the end of the range is
-/// where the clock wraps.
-const REBOOT_STEPS_MS: Range<u32> = 1_000..1 << 31;
 
 /// Without a report for so long, the attitude is that of a gimbal which does what it is told.
 const FEEDBACK_MISSING_AFTER: Duration = Duration::from_secs(2);
@@ -83,8 +79,7 @@ pub struct MavlinkV1Driver {
     sent: Option<(Timestamp, MountControl)>,
     configuration: Configuration,
     feedback: Feedback,
-    /// Its clock, where it tells it.
-    boot_ms: Option<u32>,
+    clock: BootClock,
     /// It said that it is one, which has a family of its own.
     says_gremsy: bool,
     gremsy_questions_left: u8,
@@ -139,7 +134,7 @@ impl MavlinkV1Driver {
             sent: None,
             configuration: Configuration::Unknown,
             feedback: Feedback::Awaited,
-            boot_ms: None,
+            clock: BootClock::default(),
             says_gremsy: false,
             gremsy_questions_left: GREMSY_QUESTIONS,
             assumed: GimbalAngles::default(),
@@ -177,17 +172,16 @@ impl MavlinkV1Driver {
     }
 
     fn handle_boot_ms(&mut self, boot_ms: u32) {
-        let before = self.boot_ms.replace(boot_ms);
-        if before.is_some_and(|before| REBOOT_STEPS_MS.contains(&before.wrapping_sub(boot_ms))) {
+        if self.clock.handle_time(boot_ms) {
             self.restart();
-            self.boot_ms = Some(boot_ms);
+            self.clock.handle_time(boot_ms);
         }
     }
 
     /// It does not do any more what it was told, and is not told it again before somebody asks. Its next heartbeat says
     /// whether it is ready.
     fn restart(&mut self) {
-        self.boot_ms = None;
+        self.clock.forget();
         self.ready = false;
         self.wanted = None;
         self.sent = None;
@@ -309,7 +303,7 @@ impl MavlinkV1Driver {
     fn lose(&mut self) {
         self.alive = false;
         self.ready = false;
-        self.boot_ms = None;
+        self.clock.forget();
         // Another may come in its place.
         self.says_gremsy = false;
         self.gremsy_questions_left = GREMSY_QUESTIONS;

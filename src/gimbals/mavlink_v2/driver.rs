@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use super::packet::{self, DeviceStatus};
 use crate::geometry::Angle;
+use crate::gimbals::boot_clock::BootClock;
 use crate::gimbals::capabilities::Capabilities;
 use crate::gimbals::details::GimbalDetails;
 use crate::gimbals::driver::{CommandOutcome, DriverOutput, GimbalDriver};
@@ -45,9 +46,6 @@ const LEAST_STATUS_RATE_HZ: u32 = 5;
 const WANTED_STATUS_INTERVAL: Duration = Duration::from_millis(100);
 const RATE_REQUESTS: u8 = 3;
 
-/// A time since boot that jumps back further means that the device was restarted.
-const REBOOT_STEP_MS: u32 = 1_000;
-
 /// Drives one v2 gimbal device.
 #[derive(Debug, Default)]
 pub struct MavlinkV2Driver {
@@ -61,7 +59,7 @@ pub struct MavlinkV2Driver {
     requests: u32,
     /// When it was or will be asked because it seemed to have been restarted.
     asked_on_restart: Option<Timestamp>,
-    boot_ms: Option<u32>,
+    clock: BootClock,
     statuses_in_window: u32,
     /// How often 285 may still be asked for.
     rate_requests_left: u8,
@@ -115,8 +113,7 @@ impl MavlinkV2Driver {
     }
 
     fn handle_boot_time(&mut self, now: Timestamp, boot_ms: u32) {
-        let before = self.boot_ms.replace(boot_ms);
-        if before.is_some_and(|before| before.wrapping_sub(boot_ms) > REBOOT_STEP_MS && boot_ms < before) {
+        if self.clock.handle_time(boot_ms) {
             self.fills_delta_yaw = false;
             self.rate_requests_left = RATE_REQUESTS;
             self.outputs.push_back(DriverOutput::Report(Report::Restarted));
@@ -232,7 +229,7 @@ impl MavlinkV2Driver {
 
     fn lose(&mut self) {
         self.alive = false;
-        self.boot_ms = None;
+        self.clock.forget();
         for timer in [Timer::AskInformation, Timer::UseWithoutInformation, Timer::CheckRate] {
             self.timers.cancel(timer);
         }

@@ -72,7 +72,7 @@ fn look(world: &mut World, places: Places, pitch_deg: f64, yaw_deg: f64) {
 /// Time passes while the gimbal goes on saying where it looks and the ground station that it is there.
 fn run_looking(world: &mut World, places: Places, duration: Duration, pitch_deg: f64, yaw_deg: f64) {
     let status = device_status(world.now, 44, pitch_deg, yaw_deg);
-    let status = GIMBAL_DEVICE_ATTITUDE_STATUS_DATA { time_boot_ms: u32::MAX, ..status };
+    let status = GIMBAL_DEVICE_ATTITUDE_STATUS_DATA { time_boot_ms: 1 << 30, ..status };
     let repeated = [
         (SECOND / 10, places.gimbal, GIMBAL, MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status)),
         (SECOND, places.ground, GCS, ground_heartbeat()),

@@ -25,9 +25,6 @@ const REBOOT_IS_SILENT_FOR: Duration = Duration::from_secs(3);
 const READY_WITHIN: Duration = Duration::from_secs(20);
 const STATUS_WITHIN: Duration = Duration::from_secs(10);
 
-/// A time since boot that jumps back further means that the device was restarted.
-const REBOOT_STEP_MS: u32 = 1_000;
-
 /// It was told to start again, or to switch itself off, and did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Off {
@@ -42,7 +39,7 @@ impl GremsyDriver {
         self.mount.handle_restart();
         self.is_handed_over = false;
         self.effect.forget();
-        self.heard.boot_ms = None;
+        self.heard.clock.forget();
         self.begin(now, device);
         if self.is_reported {
             self.outputs.push_back(DriverOutput::Report(Report::Restarted));
@@ -181,11 +178,9 @@ impl GremsyDriver {
     }
 
     pub(super) fn handle_boot_ms(&mut self, now: Timestamp, device: MavId, boot_ms: u32) {
-        let before = self.heard.boot_ms.replace(boot_ms);
-        let is_back = before.is_some_and(|before| before.wrapping_sub(boot_ms) > REBOOT_STEP_MS && boot_ms < before);
-        if is_back && self.is_present {
+        if self.heard.clock.handle_time(boot_ms) && self.is_present {
             self.restart(now, device);
-            self.heard.boot_ms = Some(boot_ms);
+            self.heard.clock.handle_time(boot_ms);
         }
     }
 
