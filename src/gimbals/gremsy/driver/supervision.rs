@@ -197,7 +197,7 @@ impl GremsyDriver {
         let waited = now.since(self.begun);
         match self.heard.status {
             None if waited >= STATUS_WITHIN => self.raise(Fault::NoStatus),
-            Some((_, status)) if waited >= READY_WITHIN && !status.is_aligned() => {
+            Some((_, status)) if waited >= READY_WITHIN && !self.is_present && !status.is_aligned() => {
                 self.raise(Fault::NotAligned(status.alignment));
             }
             _ => {}

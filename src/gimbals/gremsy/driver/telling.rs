@@ -224,8 +224,10 @@ impl GremsyDriver {
             Some(kind) => self.raise(Fault::RadioType(kind)),
             None => {}
         }
-        if let Some(version) = self.version().filter(|version| version.has_wrong_earth_yaw()) {
-            self.raise(Fault::EarthYaw(version));
+        match self.version() {
+            Some(version) if version.has_wrong_earth_yaw() => self.raise(Fault::EarthYaw(version)),
+            Some(_) => self.faults.clear(|fault| matches!(fault, Fault::EarthYaw(_))),
+            None => {}
         }
         if self.parameters.is_settled() && self.parameters.values().next().is_none() {
             self.raise(Fault::NoParameters);

@@ -2,7 +2,10 @@ use super::*;
 use crate::geometry::{AngularRate, YawFrame};
 use crate::gimbals::gremsy::packet;
 use crate::gimbals::setpoint::{RadioControl, Stabilised};
-use crate::wire::dialect::{GIMBAL_DEVICE_SET_ATTITUDE_DATA, HEARTBEAT_DATA, MessageData, SYS_STATUS_DATA};
+use crate::wire::dialect::{
+    CharArray, GIMBAL_DEVICE_INFORMATION_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA, HEARTBEAT_DATA, MessageData,
+    SYS_STATUS_DATA,
+};
 use crate::wire::ids::mav_state;
 use crate::wire::{DatagramFrames, encode_to_vec};
 
@@ -36,10 +39,9 @@ fn heartbeat() -> HEARTBEAT_DATA {
     }
 }
 
-/// A gimbal that beats and is ready, without parameters, for so many milliseconds.
-fn run(driver: &mut GremsyDriver, from: u64, to: u64) -> Vec<(u64, GIMBAL_DEVICE_SET_ATTITUDE_DATA)> {
-    let heartbeat = heartbeat();
-    let status = SYS_STATUS_DATA {
+/// Motors on, following; `not_aligned` as `errors_count2`.
+fn status(not_aligned: u16) -> SYS_STATUS_DATA {
+    SYS_STATUS_DATA {
         onboard_control_sensors_present: 0,
         onboard_control_sensors_enabled: 0,
         onboard_control_sensors_health: 0,
@@ -50,19 +52,34 @@ fn run(driver: &mut GremsyDriver, from: u64, to: u64) -> Vec<(u64, GIMBAL_DEVICE
         drop_rate_comm: 0,
         errors_comm: 0,
         errors_count1: 0x0011,
-        errors_count2: 0,
+        errors_count2: not_aligned,
         errors_count3: 0,
         errors_count4: 0,
         onboard_control_sensors_present_extended: 0,
         onboard_control_sensors_enabled_extended: 0,
         onboard_control_sensors_health_extended: 0,
-    };
+    }
+}
+
+/// A gimbal that beats and is ready, without parameters, for so many milliseconds.
+fn run(driver: &mut GremsyDriver, from: u64, to: u64) -> Vec<(u64, GIMBAL_DEVICE_SET_ATTITUDE_DATA)> {
+    run_with(driver, from, to, &status(0))
+}
+
+/// The same with another status.
+fn run_with(
+    driver: &mut GremsyDriver,
+    from: u64,
+    to: u64,
+    status: &SYS_STATUS_DATA,
+) -> Vec<(u64, GIMBAL_DEVICE_SET_ATTITUDE_DATA)> {
+    let heartbeat = heartbeat();
     let mut sent = Vec::new();
     for millis in from..to {
         let now = Timestamp::from_millis(millis);
         if millis.is_multiple_of(1_000) {
             hear(driver, now, &heartbeat);
-            hear(driver, now, &status);
+            hear(driver, now, status);
         }
         if driver.poll_timeout().is_some_and(|due| due <= now) {
             driver.handle_timeout(now);
@@ -144,4 +161,46 @@ fn zeros(driver: &mut GremsyDriver) -> (usize, usize) {
             if (zero.angular_velocity_x, zero.angular_velocity_y, zero.angular_velocity_z) == (0.0, 0.0, 0.0)));
     }
     (v1, v2)
+}
+
+fn faults(driver: &GremsyDriver) -> Vec<String> {
+    driver.details(Timestamp::ZERO).faults
+}
+
+/// A joint that searches its home while the gimbal runs keeps it from nothing: it has become ready.
+#[test]
+fn one_that_has_become_ready_is_not_said_to_become_ready_no_more() {
+    let mut driver = GremsyDriver::new(GremsySettings::default());
+    driver.adopt(Timestamp::ZERO, GIMBAL);
+    run_with(&mut driver, 0, 25_000, &status(0x0040));
+    assert!(faults(&driver).iter().any(|fault| fault.starts_with("it does not become ready: pan_home_search.")));
+    run(&mut driver, 25_000, 27_000);
+    assert_eq!(driver.details(Timestamp::from_secs(27)).stage.as_deref(), Some("running"));
+    let ready = faults(&driver);
+
+    run_with(&mut driver, 27_000, 60_000, &status(0x0040));
+
+    assert_eq!(faults(&driver), ready);
+    let details = driver.details(Timestamp::from_secs(60));
+    assert_eq!((details.stage.as_deref(), details.not_aligned), (Some("running"), vec!["pan_home_search".to_owned()]));
+}
+
+/// "It stands in the status as long as it is so": firmware with a wrong yaw from North was replaced.
+#[test]
+fn a_fault_of_the_firmware_ends_with_it() {
+    let mut driver = GremsyDriver::new(GremsySettings::default());
+    driver.adopt(Timestamp::ZERO, GIMBAL);
+    let with_firmware = |driver: &mut GremsyDriver, millis, firmware_version| {
+        let information = GIMBAL_DEVICE_INFORMATION_DATA {
+            vendor_name: CharArray::from("GREMSY"),
+            firmware_version,
+            ..GIMBAL_DEVICE_INFORMATION_DATA::DEFAULT
+        };
+        hear(driver, Timestamp::from_millis(millis), &information);
+        run(driver, millis, millis + 20_000);
+        faults(driver).iter().any(|fault| fault.contains("reports a wrong yaw from North"))
+    };
+    run(&mut driver, 0, 1_000);
+    assert!(with_firmware(&mut driver, 1_000, 0x0004_0807));
+    assert!(!with_firmware(&mut driver, 21_000, 0x0009_0807));
 }
