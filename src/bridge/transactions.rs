@@ -149,10 +149,16 @@ impl Transactions {
         self.lanes.retain(Lane::is_in_use);
     }
 
-    /// Forgets every command: the system that sent them is ours no more. Nobody is told.
+    /// Forgets every command: the system that sent them is ours no more. Drivers, which wait for what became of theirs, are
+    /// told that there was no answer; nobody else is told.
     pub fn clear(&mut self) {
-        self.lanes.clear();
-        self.outputs.clear();
+        let is_of_driver = |order: &Order| order.asker == Asker::Driver;
+        self.outputs
+            .retain(|output| matches!(output, TransactionOutput::Finished { order, .. } if is_of_driver(order)));
+        let lanes = self.lanes.drain(..);
+        let orders = lanes.flat_map(|lane| lane.sent.map(|sent| sent.order).into_iter().chain(lane.waiting));
+        let unanswered = |order| TransactionOutput::Finished { order, outcome: CommandOutcome::Unanswered };
+        self.outputs.extend(orders.filter(is_of_driver).map(unanswered));
     }
 
     pub fn handle_timeout(&mut self, now: Timestamp) {
@@ -387,6 +393,23 @@ mod tests {
             }
             transactions.handle_timeout(now);
         }
+    }
+
+    /// When our system is another, what was asked under the former id is over: a driver that waits for an answer goes on.
+    #[test]
+    fn drivers_are_told_of_commands_that_are_forgotten() {
+        let mut transactions = Transactions::default();
+        let of_driver = |message_id| Order { asker: Asker::Driver, ..interval(message_id) };
+        transactions.send(at(0), of_driver(285));
+        transactions.send(at(0), of_driver(265));
+        transactions.send(at(0), interval(286));
+        assert_eq!(drain(&mut transactions), [send(285, 0)]);
+
+        transactions.clear();
+
+        let unanswered = |order| TransactionOutput::Finished { order, outcome: CommandOutcome::Unanswered };
+        assert_eq!(drain(&mut transactions), [unanswered(of_driver(285)), unanswered(of_driver(265))]);
+        assert_eq!(transactions.poll_timeout(), None);
     }
 
     fn drain(transactions: &mut Transactions) -> Vec<TransactionOutput> {
