@@ -43,7 +43,9 @@ impl Bridge {
         let is_heartbeat = frame.message_id() == message::HEARTBEAT;
         match hearing {
             Hearing::Device { gimbal, twin } => {
-                gimbal.driver.handle_received(now, frame);
+                if !is_answer_to_another(frame, MavId::new(system, gimbal.component)) {
+                    gimbal.driver.handle_received(now, frame);
+                }
                 let may_be_self_managed = gimbal.is_only_a_heartbeat();
                 if let Some(other_on) = twin {
                     let conflict = Conflict::DeviceElsewhere { device: source, managed_on: place.link, other_on };
@@ -163,6 +165,11 @@ fn sign_of(frame: &Frame<'_>) -> Sign {
         // Ids above 6 are not allowed in these messages (protocol notes 1.7): ignored.
         Some(_) | None => Sign::None,
     }
+}
+
+/// Whether it is what a gimbal answers to a command of somebody else than `manager`.
+fn is_answer_to_another(frame: &Frame<'_>, manager: MavId) -> bool {
+    frame.message_id() == message::COMMAND_ACK && !frame.target().includes(manager)
 }
 
 /// Whether a frame is what a v2 device says of itself, which clients take for the device of that id.

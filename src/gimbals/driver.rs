@@ -19,7 +19,7 @@ pub trait GimbalDriver: std::fmt::Debug {
     /// The component this driver is to talk to.
     fn adopt(&mut self, now: Timestamp, device: MavId);
 
-    /// A frame that the device sent.
+    /// A frame that the device sent, but for what it answers to others.
     fn handle_received(&mut self, now: Timestamp, frame: &Frame<'_>);
 
     /// The link to the device is gone, and the device with it.

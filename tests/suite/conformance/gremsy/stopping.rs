@@ -9,7 +9,7 @@ use gimbald::gimbals::gremsy::packet;
 use gimbald::gimbals::operation::{OperationError, YawMode};
 use gimbald::manager::asked::NotDone;
 use gimbald::sim::peer::{Peer, PlatformMotion};
-use gimbald::wire::dialect::MessageData;
+use gimbald::wire::dialect::{COMMAND_ACK_DATA, MavMessage, MessageData};
 
 use super::*;
 use crate::support::script::NAN;
@@ -159,5 +159,30 @@ fn neutral_and_radio_control_come_after_the_stop() {
             run(&mut world, places, 4 * SECOND);
             assert_rests(&mut world, places);
         }
+    }
+}
+
+/// Gimbal statement 8: "an ACK … with target 2/191 is ignored." What the gimbal answers to another is no sign that it has
+/// heard our stop.
+#[test]
+fn what_it_answers_to_another_does_not_tell_that_it_has_stopped() {
+    let (mut world, places, deaf) = turning(Generation::V1);
+    deaf.setpoints.set(u32::MAX);
+    demand(&mut world, places, [NAN, NAN, 0.0, 0.0, 44.0]);
+    for (target, may_be_turning) in [((2, 191), true), ((255, 190), true), ((1, 192), true), ((1, 191), false)] {
+        for _ in 0..20 {
+            let ack = COMMAND_ACK_DATA {
+                command: command::DO_MOUNT_CONTROL,
+                result: 0,
+                progress: 0,
+                result_param2: 0,
+                target_system: target.0,
+                target_component: target.1,
+            };
+            world.send(places.gimbal, GIMBAL, &MavMessage::COMMAND_ACK(ack));
+        }
+        run(&mut world, places, SECOND);
+        let noted: &[&str] = if may_be_turning { &["camera"] } else { &[] };
+        assert_eq!(world.stored_turning, noted, "{target:?}");
     }
 }
