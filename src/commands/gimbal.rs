@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::task::Poll;
 use std::time::Duration;
 
+use serde::Deserialize;
 use serde_json::Value;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::time::{Instant, sleep_until};
@@ -87,10 +88,11 @@ fn run(arguments: &GimbalArgs, output: &mut impl Write) -> Result<(), GimbalErro
             Some(Order::Act(act)) => {
                 let token = token(arguments)?;
                 let answer = carry_out(&target, &of_gimbal, act, &token).await?;
+                let Done { done } = serde_json::from_slice(&answer).map_err(|error| target.not_gimbald(error))?;
                 Ok(if arguments.json {
                     as_it_is(&answer)
                 } else {
-                    format!("{}: {} done\n", printable_text(name), act.action.command)
+                    format!("{}: {} done\n", printable_text(name), printable_text(&done))
                 })
             }
         }
@@ -99,6 +101,12 @@ fn run(arguments: &GimbalArgs, output: &mut impl Write) -> Result<(), GimbalErro
     runtime.shutdown_background();
     output.write_all(result?.as_bytes()).and_then(|()| output.flush()).map_err(ClientError::Output)?;
     Ok(())
+}
+
+/// The answer to what was asked for.
+#[derive(Deserialize)]
+struct Done {
+    done: String,
 }
 
 /// Those that there are, a line for each.

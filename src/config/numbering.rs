@@ -12,6 +12,9 @@ use crate::manager::voice::LAST_NUMBER;
 /// The managers that need no setting: ONBOARD_COMPUTER to ONBOARD_COMPUTER4.
 const AUTOMATIC: [u8; 4] = [191, 192, 193, 194];
 
+/// The component ids of gimbal devices: GIMBAL to GIMBAL6.
+const DEVICES: [u8; 6] = [154, 171, 172, 173, 174, 175];
+
 /// Why the manager of a gimbal may not have a component id, as "component … is …".
 fn reserved(id: u8, gimbal: &Gimbal, presents_devices: bool) -> Option<&'static str> {
     // The manager of a gimbal that is no v2 device speaks for the device, too; but not beside one that is presented.
@@ -20,7 +23,7 @@ fn reserved(id: u8, gimbal: &Gimbal, presents_devices: bool) -> Option<&'static 
     let speaks_for_device = (speaks_through_manager(gimbal) || is_gremsy && is_v1) && !presents_devices;
     match id {
         100..=105 => Some("a camera's"),
-        154 | 171..=175 if !speaks_for_device => Some("a gimbal device's"),
+        id if DEVICES.contains(&id) && !speaks_for_device => Some("a gimbal device's"),
         _ => None,
     }
 }
@@ -91,7 +94,8 @@ fn check_devices(gimbals: &[Gimbal], problems: &mut Vec<Problem>) {
         let Some(id) = &gimbal.component_id else { continue };
         if managers.contains(&id.value) {
             let found = format!("found {}, which is a manager's id", id.value);
-            problems.push(id.problem(found, "the component id of the device, for example 154"));
+            let free = DEVICES.iter().find(|id| !managers.contains(id)).unwrap_or(&DEVICES[0]);
+            problems.push(id.problem(found, format!("the component id of the device, for example {free}")));
         }
         let same = gimbals[..position].iter().any(|earlier| {
             earlier.component_id.as_ref().is_some_and(|earlier| earlier.value == id.value)

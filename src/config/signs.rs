@@ -12,6 +12,8 @@ const WORDS: &[(&str, Signs)] = &[("normal", Signs::NORMAL), ("reversed", Signs:
 pub(super) fn signs(raw: &Raw) -> Result<Signs, Expected> {
     match raw {
         Raw::Table(table) => axes(table),
+        Raw::Variable(_) => word(raw, WORDS)
+            .map_err(|Expected(words)| Expected(format!("{words} (signs of single axes can be set in the file)"))),
         raw => word(raw, WORDS)
             .map_err(|Expected(words)| Expected(format!("{words}, or a table such as {{ pitch = -1, yaw = -1 }}"))),
     }

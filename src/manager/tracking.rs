@@ -142,7 +142,10 @@ impl Tracking {
     ) -> Result<(), Refusal> {
         self.carry_on(now, situation);
         self.need_frame(frame, situation)?;
-        let kept = self.reference(frame, situation).ok_or(Refusal::later("no_attitude"))?;
+        // What it was told may be known from North only, and where that is no longer.
+        let measured = || self.unnudged_pose(frame, situation).map(|pose| Point::still(pose, frame, Stabilised::BOTH));
+        let kept = self.reference(frame, situation).or_else(measured);
+        let kept = kept.ok_or_else(|| self.nothing_to_keep(frame, situation))?;
         let pose = Pose { roll: kept.roll.at, pitch: kept.pitch.at, yaw: kept.yaw.at };
         let aim = Aim::Point(Point::still(pose, frame, kept.stabilised));
         self.change_hands(now, &aim, situation)?;

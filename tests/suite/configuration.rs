@@ -412,6 +412,9 @@ fn devices_have_ids_of_their_own_on_their_link() {
     assert_refused(&two(on_ground, on_ground), &[&format!("c.toml:12: {same}")]);
     let manager = "gimbal.a.component_id: found 191, which is a manager's id; expected the component id of the device, for example 154";
     assert_refused("[[gimbal]]\nname = \"a\"\ncomponent_id = 191\n", &[&format!("c.toml:7: {manager}")]);
+    let own = "gimbal.a.component_id: found 154, which is a manager's id; expected the component id of the device, for example 171";
+    let both = "[[gimbal]]\nname = \"a\"\nfamily = \"mavlink_v1\"\ncomponent_id = 154\nmanager_component_id = 154\n";
+    assert_refused(both, &[&format!("c.toml:8: {own}")]);
     let second_link = "[[link]]\nname = \"radio\"\nrole = \"ground\"\nendpoint = \"udpin:0.0.0.0:14551\"\n";
     let apart = two(on_ground, "link = \"radio\"\n");
     assert_eq!(check(&format!("{LINK}{second_link}{apart}"), &[]).code, Some(0));
@@ -607,6 +610,15 @@ fn a_wrong_variable_is_named() {
         r#"GIMBALD__VEHICLE__SYSTEM_ID: vehicle.system_id: found "300"; expected "auto" or a whole number from 1 to 255"#,
     ];
     assert_eq!(check(LINK, &variables), refused(&lines));
+}
+
+/// What is recommended is possible there.
+#[test]
+fn a_variable_is_not_told_of_tables() {
+    let gimbal = format!("{LINK}[[gimbal]]\nname = \"camera\"\nfamily = \"mavlink_v1\"\n");
+    let variables = [("GIMBALD__GIMBAL__CAMERA__V1_SIGN", "{ pitch = -1 }")];
+    let line = r#"GIMBALD__GIMBAL__CAMERA__V1_SIGN: gimbal.camera.v1_sign: found "{ pitch = -1 }"; expected normal or reversed (signs of single axes can be set in the file)"#;
+    assert_eq!(check(&gimbal, &variables), refused(&[line]));
 }
 
 /// A name may hold the `__` that separates the parts of a variable, and `_` beside it.

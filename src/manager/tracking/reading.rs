@@ -94,7 +94,7 @@ impl Tracking {
             }
             return Ok(Some(Aim::Turn(turn)));
         }
-        let missing = Refusal::later("no_attitude");
+        let missing = self.nothing_to_keep(hold, situation);
         if radio_control == RadioControl::Exclusive {
             let kept = reference.ok_or(missing)?;
             let [roll, pitch, yaw] = [kept.roll, kept.pitch, kept.yaw].map(|axis| Axis::still(axis.at));
@@ -182,6 +182,14 @@ impl Tracking {
         }
         let pose = self.unnudged_pose(frame, situation)?;
         Some(Point::still(pose, frame, stabilised))
+    }
+
+    /// Why there is nothing to keep: where the gimbal looks is not known, or not from where `frame` counts.
+    pub(super) fn nothing_to_keep(&self, frame: YawFrame, situation: &Situation<'_>) -> Refusal {
+        let is_known = [YawFrame::Vehicle, YawFrame::Earth]
+            .into_iter()
+            .any(|other| other != frame && situation.measured_pose(other).is_some());
+        Refusal::later(if is_known { "no_heading" } else { "no_attitude" })
     }
 
     /// Where the gimbal would look now if nobody nudged it, yaw in `frame`.

@@ -10,6 +10,7 @@ use gimbald::gimbals::gremsy::sim::{Device, DeviceSettings, Generation};
 use gimbald::gimbals::operation::{OperationError, OperationId};
 use gimbald::gimbals::settings::{Family, GimbalSettings};
 use gimbald::manager::asked::{Answer, NotDone};
+use gimbald::manager::request::Refusal;
 use gimbald::sim::vehicle::{Vehicle, VehicleSettings};
 use gimbald::timestamp::Timestamp;
 use serde_json::Value;
@@ -43,6 +44,23 @@ fn ask(world: &mut World, command: &str, in_path: Option<&str>, body: &str) -> A
     let [(answered, answer)] = &world.answers[..] else { panic!("{command}: {:?}", world.answers) };
     assert_eq!(*answered, id);
     answer.clone()
+}
+
+/// A locked Gremsy tells its yaw from North alone, so that without a vehicle's heading it is that which is missing.
+#[test]
+fn without_an_autopilot_a_locked_gremsy_needs_the_heading_to_follow() {
+    let gremsy = GimbalSettings { family: Family::Gremsy, ..GimbalSettings::found("camera".to_owned()) };
+    let (mut world, places) = World::empty(Settings { gimbals: vec![gremsy], ..three_links() });
+    world.install(places.gimbal, Device::new(Timestamp::ZERO, DeviceSettings::of(Generation::V1)));
+    world.run_for(25 * SECOND);
+    take(&mut world);
+    done(&mut world, "yaw-mode", None, r#"{"mode": "lock"}"#);
+    world.run_for(SECOND);
+    done(&mut world, "lock", None, "");
+    world.run_for(SECOND);
+
+    let no_heading = Err(NotDone::Refused { refusal: Refusal::later("no_heading"), holder: None });
+    assert_eq!(ask(&mut world, "follow", None, ""), no_heading);
 }
 
 #[track_caller]

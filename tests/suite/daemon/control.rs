@@ -2,9 +2,10 @@
 
 use std::fs;
 use std::io::{Read, Write};
-use std::net::TcpStream;
+use std::net::{TcpListener, TcpStream};
 use std::os::unix::fs::PermissionsExt;
 use std::process::{Command, Stdio};
+use std::thread;
 use std::time::Duration;
 
 use gimbald::bridge::snapshot::Snapshot;
@@ -160,6 +161,33 @@ fn refusals_have_their_exit_codes() {
     let rejected = flight.daemon.status().gimbals[0].rejected["http"].clone();
     assert_eq!(rejected["not_in_control"], 1, "{rejected:?}");
     assert_eq!(rejected["only_for_the_holder"], 1, "{rejected:?}");
+}
+
+/// What has no daemon's answer was not done by one.
+#[test]
+fn what_is_no_gimbald_has_done_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("token"), TOKEN).expect("a writable folder");
+    fs::set_permissions(folder.path().join("token"), fs::Permissions::from_mode(0o600)).expect("our own file");
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let url = format!("http://{}", listener.local_addr().expect("a port"));
+    let answers = thread::spawn(move || {
+        for body in ["", "done", "{\"gimbal\": \"camera\"}"] {
+            let (mut stream, _) = listener.accept().expect("a client");
+            let length = stream.read(&mut [0; 4096]).expect("a request");
+            assert!(length > 0);
+            let answer = format!("HTTP/1.1 200 OK\r\ncontent-length: {}\r\n\r\n{body}", body.len());
+            stream.write_all(answer.as_bytes()).expect("it listens");
+        }
+    });
+    for why in ["EOF while parsing", "expected value", "missing field `done`"] {
+        let arguments = ["gimbal", "camera", "stop", "--token-file", "token", "--url", &url];
+        let outcome = gimbald(folder.path(), &arguments, &[]);
+        assert_eq!((outcome.code, outcome.output.as_str()), (Some(69), ""), "{why}");
+        let expected = format!("what answers at {url} is not a gimbald of this version: {why}");
+        assert!(outcome.errors.contains(&expected), "{}", outcome.errors);
+    }
+    answers.join().expect("all of them asked");
 }
 
 /// `turn --for` turns for so long and stops; and when it is killed meanwhile the gimbal stops all the same: "a gimbal that turns

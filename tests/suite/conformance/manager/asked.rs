@@ -220,6 +220,25 @@ fn stop_lock_and_follow_keep_the_direction() {
     assert_eq!(pitch_yaw_deg(told.last().expect("it is told on").1.q).1.round(), -5.0);
 }
 
+/// D9, when the heading is lost: the direction that is locked is not known from the nose any more, so that the camera keeps
+/// where it looks.
+#[test]
+fn without_a_heading_what_was_locked_follows_from_where_it_looks() {
+    let (mut world, places) = with_gimbal();
+    fly(&mut world, places, FIELD, 90.0);
+    look(&mut world, places, -10.0, 5.0);
+    assert_eq!(ask(&mut world, &Asked::Lock), Ok(()));
+    run_looking(&mut world, places, Duration::from_millis(1_100), -12.0, 7.0);
+    world.forget();
+
+    assert_eq!(ask(&mut world, &Asked::Follow), Ok(()));
+
+    let setpoint = only_setpoint(&mut world, places);
+    let (pitch, yaw) = pitch_yaw_deg(setpoint.q);
+    assert_eq!((setpoint.flags, pitch.round(), yaw.round()), (0x2c, -12.0, 7.0));
+    assert_eq!(ask(&mut world, &Asked::Lock), later("no_heading"));
+}
+
 /// "Stays where it looks at this moment": also on the way to an angle, and while it looks at a place.
 #[test]
 fn stop_stops_whatever_moves() {
