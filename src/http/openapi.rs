@@ -12,22 +12,27 @@ pub fn description() -> Value {
         let entry = paths.entry(path).or_insert_with(|| json!({}));
         entry[method] = operation;
     };
-    for (path, about) in [
-        ("/api/v1/status", "Everything that there is to see"),
-        (GIMBALS, "The names of the gimbals"),
-        ("/healthz", "Whether the process is alive"),
-        ("/readyz", "Whether all that is configured is there"),
+    for (path, about, right, not) in [
+        ("/api/v1/status", "Everything that there is to see", AS_JSON, NO_CORE),
+        (GIMBALS, "The names of the gimbals", AS_JSON, NO_CORE),
+        ("/healthz", "Whether the process is alive", "the text ok", NO_CORE),
+        ("/readyz", "Whether all that is configured is there", "it is", "it is not; reasons says what is missing"),
     ] {
-        add(path.to_owned(), "get", reading(about, &[]));
+        add(path.to_owned(), "get", reading(about, &[], &[("200", right), ("503", not)]));
     }
+    add("/api/v1/openapi.json".to_owned(), "get", reading("This description", &[], &[("200", AS_JSON)]));
     let of_gimbal = |rest: &str| format!("{GIMBALS}/{{name}}{rest}");
     let name = parameter("name", "the gimbal", &json!({"type": "string"}));
-    add(of_gimbal(""), "get", reading("All of one gimbal", &[&name]));
+    add(of_gimbal(""), "get", reading("All of one gimbal", &[&name], &OF_GIMBAL));
     for (part, about) in PARTS {
-        add(of_gimbal(&format!("/{part}")), "get", reading(about, &[&name]));
+        add(of_gimbal(&format!("/{part}")), "get", reading(about, &[&name], &OF_GIMBAL));
     }
     let of_parameter = parameter("parameter", "its name", &json!({"type": "string"}));
-    add(of_gimbal("/parameters/{parameter}"), "get", reading("One parameter", &[&name, &of_parameter]));
+    add(
+        of_gimbal("/parameters/{parameter}"),
+        "get",
+        reading("One parameter, as far as it was read", &[&name, &of_parameter], &OF_GIMBAL),
+    );
     for action in ACTIONS {
         let in_path = action.path_field().map(|field| parameter(field.name, field.about, &schema(field)));
         let parameters: Vec<&Value> = [Some(&name), in_path.as_ref()].into_iter().flatten().collect();
@@ -41,13 +46,26 @@ pub fn description() -> Value {
     })
 }
 
-fn reading(about: &str, parameters: &[&Value]) -> Value {
-    let responses = json!({
-        "200": {"description": "as JSON"},
-        "404": {"description": "no such gimbal"},
-        "503": {"description": "the core did not answer"},
-    });
-    json!({"summary": about, "parameters": parameters, "responses": responses})
+const AS_JSON: &str = "as JSON";
+const NO_CORE: &str = "the core did not answer";
+
+/// What may be answered to whoever names a gimbal.
+const OF_GIMBAL: [(&str, &str); 4] = [
+    ("200", AS_JSON),
+    ("400", "the path is not UTF-8"),
+    ("404", "the gimbal, or what is asked of it, is not there"),
+    ("503", NO_CORE),
+];
+
+fn reading(about: &str, parameters: &[&Value], answers: &[(&str, &str)]) -> Value {
+    json!({"summary": about, "parameters": parameters, "responses": responses(answers)})
+}
+
+/// Statuses with what they mean, and the one of a stranger, who is answered nothing else.
+fn responses(answers: &[(&str, &str)]) -> Value {
+    let stranger = ("403", "a Host that this window does not answer to");
+    let described = |(status, about): &(&str, &str)| ((*status).to_owned(), json!({"description": about}));
+    [stranger].iter().chain(answers).map(described).collect::<Map<_, _>>().into()
 }
 
 fn asking(action: &Action, parameters: &[&Value]) -> Value {
@@ -58,7 +76,9 @@ fn asking(action: &Action, parameters: &[&Value]) -> Value {
     if let Some(word) = action.word {
         properties.insert(CONFIRM.to_owned(), json!({"const": word, "description": "what is dangerous needs it"}));
     }
-    let required: Vec<&str> = action.body_fields().filter(|field| field.required).map(|field| field.name).collect();
+    let mut required: Vec<&str> = action.body_fields().filter(|field| field.required).map(|field| field.name).collect();
+    // Where there is nothing else to say it is always dangerous.
+    required.extend(action.word.filter(|_| action.fields.is_empty()).map(|_| CONFIRM));
     let body = json!({
         "type": "object",
         "additionalProperties": false,
@@ -71,19 +91,22 @@ fn asking(action: &Action, parameters: &[&Value]) -> Value {
         "security": [{"token": []}],
         "parameters": parameters,
         "requestBody": {"required": !required.is_empty(), "content": {"application/json": {"schema": body}}},
-        "responses": {
-            "200": {"description": "done"},
-            "400": {"description": "the body is no JSON object"},
-            "401": {"description": "no token"},
-            "403": {"description": "a wrong token, none configured, another origin, or not allowed by the configuration"},
-            "404": {"description": "no such gimbal"},
-            "409": {"description": "not in control; holder says who is"},
-            "422": {"description": "something in the body is wrong"},
-            "501": {"description": "this gimbal has no such function"},
-            "502": {"description": "the gimbal did not do it"},
-            "503": {"description": "not for the moment"},
-            "504": {"description": "no answer"},
-        },
+        "responses": responses(&[
+            ("200", "done"),
+            ("400", "the body is no JSON object, or did not come whole"),
+            ("401", "no token"),
+            ("403", "a wrong token, none configured, another origin or Host, or not allowed by the configuration"),
+            ("404", "no such gimbal, or it has no such parameter"),
+            ("408", "the body did not come in time"),
+            ("409", "not in control; holder says who is"),
+            ("413", "the body is larger than 4096 bytes"),
+            ("415", "the body is not said to be JSON"),
+            ("422", "something in the body is wrong"),
+            ("501", "this gimbal has no such function"),
+            ("502", "the gimbal did not do it"),
+            ("503", "not for the moment"),
+            ("504", "no answer"),
+        ]),
     })
 }
 

@@ -363,26 +363,6 @@ fn reading_needs_no_token() {
     assert_eq!(none.json(), json!({"error": "no gimbal is called \"camera\"; there is none yet"}));
 }
 
-/// `GET /api/v1/openapi.json`: every action of the table is described, with each of its fields.
-#[test]
-fn the_window_describes_itself() {
-    let described = Window::of(Snapshot::default()).get("/api/v1/openapi.json").json();
-    assert_eq!(described["openapi"], "3.1.0");
-    for action in ACTIONS {
-        let operation = &described["paths"][format!("/api/v1/gimbals/{{name}}/{}", action.path)]["post"];
-        assert_eq!(operation["operationId"], action.command);
-        assert_eq!(operation["security"], json!([{"token": []}]));
-        let schema = &operation["requestBody"]["content"]["application/json"]["schema"];
-        for field in action.body_fields() {
-            assert_eq!(schema["properties"][field.name]["description"], field.about, "{}", action.path);
-        }
-        assert_eq!(schema["properties"][CONFIRM]["const"].as_str(), action.word, "{}", action.path);
-    }
-    for path in ["/api/v1/status", "/api/v1/gimbals", "/api/v1/gimbals/{name}", "/healthz"] {
-        assert!(described["paths"][path]["get"].is_object(), "{path}");
-    }
-}
-
 /// "Many requests at once": each gets its answer, and the core is asked as often as somebody asks.
 #[test]
 fn many_at_once_are_all_answered() {
