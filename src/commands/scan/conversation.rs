@@ -30,9 +30,9 @@ pub const SILENCE: Duration = Duration::from_millis(2_500);
 const INTRODUCTION: Duration = Duration::from_millis(2_500);
 /// How long others on the line have to show themselves when a gimbal has told what it is.
 const OTHERS: Duration = Duration::from_millis(1_100);
-/// Each kind of heartbeat once a second.
 /// How often a Gremsy is asked to tell where it looks, until it is switched off.
 const STATUS_INTERVAL: Duration = Duration::from_millis(100);
+/// Each kind of heartbeat once a second.
 const HEARTBEAT_INTERVAL: Duration = Duration::from_millis(500);
 const REQUEST_INTERVAL: Duration = Duration::from_millis(500);
 
@@ -240,7 +240,12 @@ impl Conversation {
         if let Some(heartbeat) = frame.decode::<HEARTBEAT_DATA>() {
             party.heartbeat = Some((heartbeat.mavtype, heartbeat.autopilot));
         }
-        if let Some(information) = packet::read_information(frame) {
+        // With another id it is said for a gimbal without MAVLink, by its manager.
+        let information = packet::read_information(frame).filter(|information| information.gimbal_device_id == 0);
+        let tells_attitude = packet::read_status(frame).is_some_and(|status| status.gimbal_device_id == 0);
+        party.is_gimbal_device |= information.is_some() || tells_attitude;
+        party.tells_v2_attitude |= tells_attitude;
+        if let Some(information) = information {
             let is_first = party.identity.is_none();
             party.identity = Some(information.identity);
             if is_first && (!party.is_gremsy() || party.tells_v2_attitude) {
@@ -248,10 +253,6 @@ impl Conversation {
             }
         }
         match frame.message_id() {
-            message::GIMBAL_DEVICE_INFORMATION | message::GIMBAL_DEVICE_ATTITUDE_STATUS => {
-                party.is_gimbal_device = true;
-                party.tells_v2_attitude |= frame.message_id() == message::GIMBAL_DEVICE_ATTITUDE_STATUS;
-            }
             message::MOUNT_ORIENTATION | message::MOUNT_STATUS => party.tells_v1_attitude = true,
             message::PARAM_VALUE => {
                 let value = frame.decode::<PARAM_VALUE_DATA>();
@@ -278,7 +279,7 @@ mod tests {
     use crate::sim::peer::Peer;
     use crate::sim::vehicle::{Vehicle, VehicleSettings};
     use crate::wire::DatagramFrames;
-    use crate::wire::dialect::COMMAND_LONG_DATA;
+    use crate::wire::dialect::{COMMAND_LONG_DATA, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA};
     use crate::wire::ids::command;
 
     /// Frames with the time when they were sent.
@@ -449,6 +450,35 @@ mod tests {
             }
         }
         assert!(requests > 0);
+    }
+
+    /// "Gimbal device id: 1 to 6 for gimbals without MAVLink": of those a manager speaks, such as an autopilot's own, which is no
+    /// gimbal itself.
+    #[test]
+    fn who_speaks_for_a_gimbal_is_none() {
+        for (gimbal_device_id, is_gimbal) in [(0, true), (1, false)] {
+            let mut conversation = Conversation::new(Timestamp::ZERO, 57_600);
+            let status = MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(GIMBAL_DEVICE_ATTITUDE_STATUS_DATA {
+                time_boot_ms: 1,
+                q: [1.0, 0.0, 0.0, 0.0],
+                angular_velocity_x: f32::NAN,
+                angular_velocity_y: f32::NAN,
+                angular_velocity_z: f32::NAN,
+                failure_flags: 0,
+                flags: 44,
+                target_system: 0,
+                target_component: 0,
+                delta_yaw: f32::NAN,
+                delta_yaw_velocity: f32::NAN,
+                gimbal_device_id,
+            });
+            for sequence in 0..2 {
+                let frame = FrameBuffer::default().encode_any(MavId::new(1, 1), sequence, &status).bytes().to_vec();
+                conversation.handle_received(Timestamp::ZERO, &frame);
+            }
+            let parties = conversation.into_parties();
+            assert_eq!(parties[&MavId::new(1, 1)].is_gimbal(), is_gimbal, "{gimbal_device_id}");
+        }
     }
 
     /// A checksum of 16 bits is right by chance now and then.
