@@ -8,6 +8,7 @@ pub mod detection;
 pub mod driver;
 pub mod families;
 pub mod gremsy;
+pub mod heard_time;
 pub mod mavlink_v1;
 pub mod mavlink_v2;
 pub mod operation;

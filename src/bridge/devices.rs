@@ -43,6 +43,7 @@ impl Bridge {
         let is_heartbeat = frame.message_id() == message::HEARTBEAT;
         match hearing {
             Hearing::Device { gimbal, twin } => {
+                gimbal.manager.handle_device_heard(now);
                 if !is_answer_to_another(frame, MavId::new(system, gimbal.component)) {
                     gimbal.driver.handle_received(now, frame);
                 }

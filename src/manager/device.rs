@@ -41,11 +41,10 @@ impl GimbalManager {
             }
             Report::Stands => self.forget_rotation(),
             Report::Alive { device } => {
-                if self.device.is_some_and(|before| before != device) {
-                    self.rotation = None;
-                }
                 if self.device != Some(device) {
                     self.readiness = ReadinessWatch::default();
+                    // It may be the one that was told to turn, under another id.
+                    self.leave_turning();
                     self.tracking.forget();
                     self.heading_bias = HeadingBias::default();
                     self.identity = Identity::default();

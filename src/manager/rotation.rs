@@ -1,16 +1,17 @@
 //! Whether the gimbal may be turning as it was told, and the word that stops it when there is nobody to decide more.
 //!
-//! A word may be lost. So what was told to turn counts as turning until it was told otherwise for a while, and what an
-//! earlier run, a loss or another dialect left turning is told to stop before anything is known of it: that takes no
-//! knowledge.
+//! A word may be lost. So what was told to turn counts as turning until it was told otherwise for a while in which it was
+//! heard, and what an earlier run, a loss or another dialect left turning is told to stop before anything is known of it:
+//! that takes no knowledge.
 
 use std::time::Duration;
 
 use super::{DeviceState, GimbalManager, ManagerOutput};
+use crate::gimbals::heard_time::HeardTime;
 use crate::gimbals::setpoint::{Setpoint, Turning};
 use crate::timestamp::Timestamp;
 
-/// What was told something else than its rotation for so long has heard it.
+/// What was told something else than its rotation for so long, and was heard meanwhile, has heard it.
 pub const STOPPED_AFTER: Duration = Duration::from_secs(1);
 
 /// A gimbal that was left turning is told so often to stop while it is not known.
@@ -20,8 +21,8 @@ pub const STOP_UNKNOWN_EVERY: Duration = Duration::from_millis(500);
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rotation {
     turning: Turning,
-    /// Since when it is told something else.
-    stopped: Option<Timestamp>,
+    /// For how long it was heard since it is told something else.
+    stopped: Option<HeardTime>,
     /// Nobody has told it anything since it was left to itself.
     is_left: bool,
 }
@@ -41,6 +42,21 @@ impl GimbalManager {
     pub fn handle_sign(&mut self, now: Timestamp) {
         self.is_heard = true;
         self.stop_what_was_left_turning(now);
+    }
+
+    /// Its device said something, whatever it was.
+    pub fn handle_device_heard(&mut self, now: Timestamp) {
+        let is_paused = !self.pauses.is_empty();
+        let Some(rotation) = self.rotation.as_mut().filter(|rotation| !rotation.is_left) else { return };
+        let Some(stopped) = &mut rotation.stopped else { return };
+        if is_paused {
+            *stopped = HeardTime::new(now);
+            return;
+        }
+        stopped.handle_heard(now);
+        if stopped.passed() >= STOPPED_AFTER {
+            self.rotation = None;
+        }
     }
 
     /// Tells the gimbal to stop turning, whatever is known of it.
@@ -94,7 +110,7 @@ impl GimbalManager {
         match (self.tracking.unstopped(), &mut self.rotation) {
             (Some(turning), rotation) => *rotation = Some(Rotation { turning, stopped: None, is_left: false }),
             (None, Some(rotation)) if !rotation.is_left => {
-                rotation.stopped.get_or_insert(now);
+                rotation.stopped.get_or_insert(HeardTime::new(now));
             }
             (None, _) => {}
         }
@@ -104,25 +120,18 @@ impl GimbalManager {
     /// is to follow that is the driver's.
     pub(super) fn note_operated(&mut self, now: Timestamp) {
         if let Some(stopped) = self.rotation.as_mut().and_then(|rotation| rotation.stopped.as_mut()) {
-            *stopped = now;
+            *stopped = HeardTime::new(now);
         }
     }
 
     pub(super) fn handle_rotation_timeout(&mut self, now: Timestamp) {
-        if self.rotation_due().is_none_or(|due| due > now) {
-            return;
-        }
-        match self.rotation {
-            Some(Rotation { is_left: true, .. }) => self.stop_what_was_left_turning(now),
-            _ => self.rotation = None,
+        if self.rotation_due().is_some_and(|due| due <= now) {
+            self.stop_what_was_left_turning(now);
         }
     }
 
     pub(super) fn rotation_due(&self) -> Option<Timestamp> {
-        let rotation = self.rotation?;
-        if rotation.is_left {
-            return self.stop_unknown.filter(|_| self.is_heard && !self.is_steerable());
-        }
-        rotation.stopped.filter(|_| self.pauses.is_empty()).map(|at| at + STOPPED_AFTER)
+        let is_left = self.rotation.is_some_and(|rotation| rotation.is_left);
+        self.stop_unknown.filter(|_| is_left && self.is_heard && !self.is_steerable())
     }
 }

@@ -21,4 +21,5 @@ mod shipped_files;
 mod structure;
 mod support;
 mod topologies;
+mod turning;
 mod whole_path;

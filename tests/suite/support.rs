@@ -1,5 +1,6 @@
 //! What more than one test needs.
 
+pub mod cable;
 pub mod control_rule;
 pub mod daemon;
 pub mod documented;

@@ -135,7 +135,7 @@ impl GremsyDriver {
             Setpoint::Turn(_) => {
                 self.stop_v2(now);
                 if let Some(stopping) = &mut self.stopping {
-                    stopping.handle_sent(now);
+                    stopping.handle_sent(now, self.is_alive);
                 }
             }
             _ => (self.turning, self.stopping) = (None, None),
@@ -152,9 +152,9 @@ impl GremsyDriver {
 
     fn stop_on_in_v2(&mut self, now: Timestamp, device: MavId) {
         if let Some(stopping) = &mut self.stopping {
-            if stopping.is_over(now) {
+            if stopping.is_over() {
                 self.stopping = None;
-            } else if let Some(zero) = stopping.handle_timeout(now) {
+            } else if let Some(zero) = stopping.handle_timeout(now, self.is_alive) {
                 self.v2.handle_setpoint(now, zero);
             }
             self.drain_v2(now, device);

@@ -80,6 +80,9 @@ impl GremsyDriver {
 
     pub(super) fn handle_heard(&mut self, now: Timestamp, device: MavId) {
         let silent = now.since(std::mem::replace(&mut self.heard.latest, now));
+        if let Some(stopping) = &mut self.stopping {
+            stopping.handle_heard(now);
+        }
         self.timers.set(Timer::Lost, now + LOST_AFTER);
         if !self.is_alive {
             self.is_alive = true;

@@ -111,9 +111,40 @@ fn a_rate_in_v2_that_nobody_repeats_is_stopped() {
     let sent = run(&mut driver, 12_000, 16_000);
 
     let rates: Vec<(u64, bool)> = sent.iter().map(|(at, sent)| (*at, sent.angular_velocity_z == 0.0)).collect();
-    // It answers none of them, so they are said for a second.
-    let zeros = (12_500..13_500).step_by(100).map(|at| (at, true));
+    // It answers none of them, so they are said for a second in which it is heard: each of its beats vouches for half a one.
+    let zeros = (12_500..14_000).step_by(100).map(|at| (at, true));
     assert_eq!(rates, [(12_000, false)].into_iter().chain(zeros).collect::<Vec<_>>());
+}
+
+/// Zeros into the void stop nothing: they go on, less often, until the gimbal was heard for a second.
+#[test]
+fn a_stop_in_v2_is_said_on_until_the_gimbal_is_heard() {
+    let mut driver =
+        GremsyDriver::new(GremsySettings { generation: Some(Generation::V2), ..GremsySettings::default() });
+    driver.adopt(Timestamp::ZERO, GIMBAL);
+    run(&mut driver, 0, 12_000);
+    let turning = Turning { yaw: AngularRate::from_degrees_per_second(20.0), ..Turning::STOPPED };
+    driver.handle_setpoint(Timestamp::from_secs(12), Setpoint::Turn(turning));
+    setpoints(&mut driver);
+    let mut sent = Vec::new();
+    for millis in 12_000..30_000 {
+        let now = Timestamp::from_millis(millis);
+        if driver.poll_timeout().is_some_and(|due| due <= now) {
+            driver.handle_timeout(now);
+        }
+        sent.extend(setpoints(&mut driver).into_iter().map(|zero| (millis, zero.angular_velocity_z)));
+    }
+    assert!(sent.iter().all(|(_, rate)| *rate == 0.0), "{sent:?}");
+    let lost = 11_000 + LOST_AFTER.as_millis() as u64;
+    let (there, away): (Vec<u64>, Vec<u64>) = sent.iter().map(|(at, _)| *at).partition(|at| *at < lost);
+    assert_eq!(there, (12_500..lost).step_by(100).collect::<Vec<_>>());
+    assert!(away.len() >= 13 && away.windows(2).all(|pair| pair[1] - pair[0] >= 1_000), "{away:?}");
+    assert!(driver.may_be_turning());
+
+    let sent: Vec<u64> = run(&mut driver, 30_000, 40_000).iter().map(|(at, _)| *at).collect();
+    assert_eq!(sent.first(), Some(&30_000), "as soon as it is heard");
+    assert!(sent.last().is_some_and(|last| (31_000..32_000).contains(last)), "{sent:?}");
+    assert!(!driver.may_be_turning());
 }
 
 /// A stop takes no knowledge of the gimbal: before it is known what it speaks, zeros in both protocols, until it answers
@@ -130,7 +161,10 @@ fn a_stop_is_said_before_the_gimbal_is_known() {
     assert_eq!(zeros(&mut driver), (1, 1));
     assert!(driver.may_be_turning());
     let (mut v1, mut v2) = (0, 0);
-    for millis in (10..3_000).step_by(10) {
+    for millis in (10_u64..3_000).step_by(10) {
+        if millis.is_multiple_of(100) {
+            hear(&mut driver, Timestamp::from_millis(millis), &heartbeat());
+        }
         driver.handle_timeout(Timestamp::from_millis(millis));
         let (more_v1, more_v2) = zeros(&mut driver);
         (v1, v2) = (v1 + more_v1, v2 + more_v2);

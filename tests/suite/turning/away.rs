@@ -1,0 +1,98 @@
+//! Its cable is away while the rotation ends.
+
+use super::*;
+
+/// How the rotation ends that nobody wants any more.
+#[derive(Clone, Copy, Debug)]
+enum End {
+    /// Whoever asked for it does not repeat it.
+    NotRepeated,
+    /// An accepted stop.
+    Stop,
+    /// Another direction.
+    Angle,
+    /// Its operator lets go of it.
+    Released,
+}
+
+const ENDS: [End; 4] = [End::NotRepeated, End::Stop, End::Angle, End::Released];
+
+impl Flight {
+    fn end_rotation(&mut self, end: End) {
+        let (ground, manager) = (self.places.ground, MANAGER);
+        let command = match end {
+            End::NotRepeated => return,
+            End::Stop => {
+                assert_eq!(self.rate_command(0.0), Some(ACCEPTED));
+                return;
+            }
+            End::Angle => command_long(manager, 1000, &[-10.0, 0.0, NAN, NAN, 44.0, 0.0, 0.0]),
+            End::Released => command_long(manager, 1001, &[-3.0, -3.0, -3.0, -3.0, 0.0, 0.0, 0.0]),
+        };
+        self.world.send(ground, GCS, &command);
+    }
+}
+
+/// "A setpoint is forgotten when the gimbal is lost, but for a rotation, which is stopped at once and again when it is
+/// heard: it may have gone on turning." What was said to stop it while it was away went into the void, also where it was
+/// accepted and said for a second.
+#[test]
+fn what_ended_while_the_gimbal_was_away_is_stopped_when_it_is_back() {
+    for kind in KINDS {
+        for end in ENDS {
+            for away in [2, 8] {
+                let what = format!("{kind:?} {end:?}, {away} s");
+                let mut flight = Flight::turning(kind);
+                flight.cable.cut();
+                flight.turn_for(SECOND / 2);
+                flight.end_rotation(end);
+                flight.run_for(away * SECOND);
+                assert_eq!(flight.world.stored_turning.len(), 1, "{what}: nothing has heard that it is to stop");
+
+                flight.cable.mend();
+                flight.run_for(3 * SECOND);
+                flight.assert_rests(&what);
+                flight.run_for(3 * SECOND);
+                assert_eq!(flight.world.stored_turning, Vec::<String>::new(), "{what}");
+            }
+        }
+    }
+}
+
+/// The same where the port itself was gone.
+#[test]
+fn what_ended_while_the_gimbal_was_unplugged_is_stopped_when_it_is_back() {
+    for kind in KINDS {
+        for end in ENDS {
+            let what = format!("{kind:?} {end:?}");
+            let mut flight = Flight::turning(kind);
+            flight.world.unplug(flight.places.gimbal);
+            flight.turn_for(SECOND / 2);
+            flight.end_rotation(if matches!(end, End::Stop) { End::NotRepeated } else { end });
+            flight.run_for(8 * SECOND);
+            assert_eq!(flight.world.stored_turning.len(), 1, "{what}");
+
+            flight.world.plug_in(flight.places.gimbal);
+            flight.run_for(3 * SECOND);
+            flight.assert_rests(&what);
+        }
+    }
+}
+
+/// A second in which it was heard is enough: then it is not told again when it comes back.
+#[test]
+fn what_was_heard_to_stop_is_left_alone_when_it_is_back() {
+    for kind in KINDS {
+        let mut flight = Flight::turning(kind);
+        flight.end_rotation(End::Stop);
+        flight.run_for(2 * SECOND);
+        assert_eq!(flight.world.stored_turning, Vec::<String>::new(), "{kind:?}");
+        flight.cable.cut();
+        flight.run_for(8 * SECOND);
+        flight.world.forget();
+        flight.cable.mend();
+        flight.run_for(8 * SECOND);
+        let setpoint = flight.world.snapshot().gimbals[0].setpoint.clone();
+        assert_eq!(setpoint, None, "{kind:?}: nobody has asked for anything");
+    }
+}
