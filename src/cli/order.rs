@@ -51,7 +51,15 @@ fn command(action: &'static Action) -> Command {
         let help = "Ask for it again and again for so long, then stop; Ctrl-C stops as well";
         command = command.arg(Arg::new(LASTING).long(LASTING).value_name("SECONDS").help(help).value_parser(seconds));
     }
-    command
+    with_name_in_usage(command)
+}
+
+/// The gimbal's name stands before its commands, which clap leaves out of what it shows as their usage.
+fn with_name_in_usage(command: Command) -> Command {
+    let named = format!("gimbald gimbal NAME {}", command.get_name());
+    let usage = command.clone().bin_name(&named).render_usage().to_string();
+    let arguments = usage.trim_start_matches("Usage: ").trim_start_matches(&named).replace(" [OPTIONS]", "");
+    command.override_usage(format!("{named} [OPTIONS]{arguments}"))
 }
 
 fn argument(field: &'static Field) -> Arg {
@@ -112,7 +120,7 @@ impl Subcommand for Order {
         let name = Arg::new("parameter").value_name("PARAMETER").help("Only this one");
         let parameters =
             Command::new(PARAMETERS).about("Show the gimbal's parameters, as far as they were read").arg(name);
-        parent.subcommand(parameters).subcommands(ACTIONS.iter().map(command))
+        parent.subcommand(with_name_in_usage(parameters)).subcommands(ACTIONS.iter().map(command))
     }
 
     fn augment_subcommands_for_update(parent: Command) -> Command {
@@ -155,7 +163,7 @@ fn read(action: &'static Action, matches: &ArgMatches) -> Result<Act, Error> {
     let lasting = if action.command == "turn" { matches.get_one::<Duration>(LASTING).copied() } else { None };
     let body = actions::body(body);
     action.read(in_path.as_deref(), &body).map_err(|wrong| {
-        let mut command = command(action).bin_name(format!("gimbald gimbal NAME {}", action.command));
+        let mut command = command(action);
         Error::raw(ErrorKind::ValueValidation, in_typed_words(action, wrong) + "\n").format(&mut command)
     })?;
     Ok(Act { action, in_path, body, lasting })
@@ -248,7 +256,12 @@ mod tests {
             ("reboot", "'reboot' can cost the camera or the flight; if it is meant, add --yes-reboot"),
             ("shutdown --yes-reboot", "unexpected argument '--yes-reboot'"),
             ("point", "nothing is asked for; expected at least one of --pitch-deg, --yaw-deg, --roll-deg"),
-            ("point", "Usage: gimbald gimbal NAME point"),
+            ("point", "Usage: gimbald gimbal NAME point [OPTIONS]\n"),
+            ("point --help", "Usage: gimbald gimbal NAME point [OPTIONS]\n"),
+            ("stop --help", "Usage: gimbald gimbal NAME stop [OPTIONS]\n"),
+            ("limits --help", "Usage: gimbald gimbal NAME limits [OPTIONS] <AXIS> <MIN_DEG> <MAX_DEG>\n"),
+            ("limits tilt", "Usage: gimbald gimbal NAME limits [OPTIONS] <AXIS> <MIN_DEG> <MAX_DEG>\n"),
+            ("parameters --help", "Usage: gimbald gimbal NAME parameters [OPTIONS] [PARAMETER]\n"),
             ("limits tilt 5 -5", "MIN_DEG must not be above MAX_DEG"),
             ("roi 91 0 0", "LATITUDE_DEG: found 91; expected a number from -90 to 90"),
             ("point --help", "up is positive; a number from -180 to 180"),
