@@ -15,7 +15,7 @@ use crate::channel::ChannelSet;
 use crate::gimbals::settings::Family;
 use crate::manager::settings::Firewall;
 use crate::timestamp::Timestamp;
-use crate::wire::Frame;
+use crate::wire::{Frame, Target};
 use crate::wire::dialect::{
     GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_MANAGER_INFORMATION_DATA, GIMBAL_MANAGER_STATUS_DATA,
 };
@@ -89,6 +89,8 @@ impl Bridge {
         let is_on = self.settings.control.firewall == Firewall::On;
         let rival = frame.source();
         let autopilot = self.autopilot.filter(|known| *known == rival).and(self.vehicle.autopilot());
+        // The managers take for theirs what goes to no component in particular.
+        let is_for_managers = is_for_mounts(frame) && !matches!(frame.target(), Target::Component(_));
         let devices = self.roster.iter().filter_map(|gimbal| Some((gimbal.manager.device()?, gimbal.channel)));
         for (device, channel) in devices.filter(|(device, _)| frame.target().includes(*device)) {
             let outcome = match is_on {
@@ -96,7 +98,9 @@ impl Bridge {
                 true => Outcome::KeptAway,
                 false => Outcome::Delivered,
             };
-            self.conflicts.note(now, Conflict::RivalMaster { rival, device, autopilot, outcome });
+            if !is_for_managers || outcome != Outcome::KeptAway {
+                self.conflicts.note(now, Conflict::RivalMaster { rival, device, autopilot, outcome });
+            }
         }
         if !is_on {
             return channels;

@@ -229,6 +229,31 @@ fn a44_the_gimbal_hears_of_no_manager_but_ours() {
     assert_eq!(world.take(places.gimbal), []);
 }
 
+/// R15: "addressed to us or to component 0, through the same gate": who says it to no component in particular is nobody's
+/// rival, but where the gimbal obeys it besides.
+#[test]
+fn r15_a_mount_command_to_component_0_is_for_the_manager() {
+    for (firewall, conflict) in [(Firewall::On, None), (Firewall::Warn, Some("255/190 steers gimbal 1/154"))] {
+        for target in [MavId::new(1, 0), MavId::new(0, 0)] {
+            let control = ControlSettings { firewall, ..ControlSettings::default() };
+            let (mut world, places) = World::empty(Settings { control, ..three_links() });
+            world.send(places.autopilot, AUTOPILOT, &px4_heartbeat());
+            introduce(&mut world, places.gimbal, GIMBAL);
+            world.forget();
+
+            world.send(places.ground, GCS, &command_long(target, 205, &[-30.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0]));
+
+            let snapshot = world.snapshot();
+            let setpoint = snapshot.gimbals[0].setpoint.as_ref().expect("it was obeyed");
+            assert_eq!((setpoint.pitch_deg.map(f64::round), setpoint.source.as_deref()), (Some(-30.0), Some("255/190")));
+            let said = world.take(places.gimbal).into_iter().filter(|arrival| arrival.source() == GCS).count();
+            assert_eq!(said, usize::from(conflict.is_some()), "to the gimbal itself");
+            assert_eq!(snapshot.conflicts.len(), said, "{:?}", snapshot.conflicts);
+            assert!(snapshot.conflicts.iter().all(|text| conflict.is_some_and(|named| text.contains(named))));
+        }
+    }
+}
+
 /// D10 where the gimbal is behind the autopilot: what passes us on its way there is kept away; what the autopilot does
 /// itself we can only tell of.
 #[test]
