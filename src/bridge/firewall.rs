@@ -15,11 +15,11 @@ use crate::channel::ChannelSet;
 use crate::gimbals::settings::Family;
 use crate::manager::settings::Firewall;
 use crate::timestamp::Timestamp;
-use crate::wire::{Frame, Target};
 use crate::wire::dialect::{
     GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_MANAGER_INFORMATION_DATA, GIMBAL_MANAGER_STATUS_DATA,
 };
 use crate::wire::ids::{command, message};
+use crate::wire::{Frame, Target};
 
 impl Bridge {
     /// Keeps from managed devices what others send straight to them, and on its link what a device sends as a manager.

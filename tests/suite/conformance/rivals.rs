@@ -245,7 +245,10 @@ fn r15_a_mount_command_to_component_0_is_for_the_manager() {
 
             let snapshot = world.snapshot();
             let setpoint = snapshot.gimbals[0].setpoint.as_ref().expect("it was obeyed");
-            assert_eq!((setpoint.pitch_deg.map(f64::round), setpoint.source.as_deref()), (Some(-30.0), Some("255/190")));
+            assert_eq!(
+                (setpoint.pitch_deg.map(f64::round), setpoint.source.as_deref()),
+                (Some(-30.0), Some("255/190"))
+            );
             let said = world.take(places.gimbal).into_iter().filter(|arrival| arrival.source() == GCS).count();
             assert_eq!(said, usize::from(conflict.is_some()), "to the gimbal itself");
             assert_eq!(snapshot.conflicts.len(), said, "{:?}", snapshot.conflicts);
