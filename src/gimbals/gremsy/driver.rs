@@ -90,6 +90,8 @@ pub struct GremsyDriver {
     streams: Streams,
     mount: Mount,
     mode_change: Option<ModeChange>,
+    /// When its motors were last told to run.
+    motors_asked: Option<Timestamp>,
     /// In v2, "retract" has switched the motors off.
     is_retracted: bool,
     /// How it was last told to turn in v2.
@@ -162,6 +164,7 @@ impl GremsyDriver {
             streams: Streams::default(),
             mount: Mount::default(),
             mode_change: None,
+            motors_asked: None,
             is_retracted: false,
             turning: None,
             stopping: None,

@@ -93,6 +93,12 @@ impl EffectWatch {
         is_stuck.then_some(Finding::NoEffect)
     }
 
+    /// It cannot move at this moment: what it has not done until now does not count.
+    pub fn pause(&mut self) {
+        self.apart_since = None;
+        self.rests = None;
+    }
+
     pub fn forget(&mut self) {
         *self = Self::default();
     }

@@ -27,7 +27,7 @@ const CAPACITY: usize = 16;
 const STOPS_WITHIN: std::time::Duration = std::time::Duration::from_secs(2);
 
 /// Motors that are switched on take 3 s, and the status comes once a second.
-const MOTORS_SHOW_WITHIN: std::time::Duration = std::time::Duration::from_secs(5);
+pub const MOTORS_SHOW_WITHIN: std::time::Duration = std::time::Duration::from_secs(5);
 const MODE_SHOWS_WITHIN: std::time::Duration = std::time::Duration::from_secs(3);
 
 /// A gimbal that was told to start again or to switch itself off, did not answer, and says nothing any more has done it:
@@ -195,6 +195,7 @@ impl GremsyDriver {
         let (command, goal) = match operation {
             Operation::Motors(motors) => {
                 let on = *motors == Motors::On;
+                self.motors_asked = on.then_some(now);
                 (packet::set_motors(device, on), Goal::Motors { on })
             }
             Operation::SetYawMode(YawMode::Lock) => (packet::lock(device), Goal::Mode(YawMode::Lock)),
@@ -311,7 +312,8 @@ impl GremsyDriver {
 
     fn handle_answered(&mut self, now: Timestamp, id: OperationId, goal: Goal, result: OperationResult) {
         match (goal, &result) {
-            (Goal::Motors { .. }, Ok(())) => {
+            (Goal::Motors { on }, Ok(())) => {
+                self.motors_asked = on.then_some(now);
                 let stage = Stage::Shown { until: now + MOTORS_SHOW_WITHIN };
                 self.operations.pending.push(Pending { id, stage, goal });
                 return;
@@ -323,8 +325,9 @@ impl GremsyDriver {
                 return;
             }
             (Goal::Rate(stream, rate), Ok(())) => self.streams.choose(stream, rate),
+            (Goal::Motors { .. }, Err(_)) => self.motors_asked = None,
             (Goal::Restart { comes_back }, Ok(())) => self.switch_off(now, comes_back),
-            (Goal::Answer | Goal::Motors { .. } | Goal::Mode(_) | Goal::Rate(..) | Goal::Restart { .. }, _) => {}
+            (Goal::Answer | Goal::Mode(_) | Goal::Rate(..) | Goal::Restart { .. }, _) => {}
         }
         self.operated(id, result);
     }

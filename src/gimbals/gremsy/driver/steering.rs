@@ -4,6 +4,7 @@ use super::effect::Pose;
 use super::faults::Fault;
 use super::mode_change::{self, ModeChange};
 use super::mount::{Condition, DEAD_MAN, MountOutput, Order};
+use super::operations::MOTORS_SHOW_WITHIN;
 use super::stopping::Stopping;
 use super::{Generation, GremsyDriver, Timer};
 use crate::geometry::{Angle, AngularRate, GimbalAngles, Yaw, YawFrame};
@@ -51,7 +52,8 @@ impl GremsyDriver {
         // Those that are off for a retract, or on their way, are no news.
         let is_off = self.heard.status.is_some_and(|(_, status)| status.operation() == OperationState::OFF);
         let is_retracted = self.is_retracted || self.mode_change.is_some() || self.mount.is_retracted();
-        if self.is_present && is_off && !is_retracted && !is_stop {
+        let may_start = self.motors_asked.is_some_and(|at| now.since(at) < MOTORS_SHOW_WITHIN);
+        if self.is_present && is_off && !is_retracted && !is_stop && !may_start {
             self.raise(Fault::MotorsOff);
         }
     }
@@ -203,10 +205,17 @@ impl GremsyDriver {
         self.version().is_some_and(|version| version.tells_yaw_frame())
     }
 
-    pub(super) fn handle_mode_step(&mut self, device: MavId, step: Option<mode_change::Step>) {
+    pub(super) fn handle_mode_step(&mut self, now: Timestamp, device: MavId, step: Option<mode_change::Step>) {
         match step {
             None => {}
-            Some(mode_change::Step::Send(mode)) => self.send_mode(device, mode),
+            Some(mode_change::Step::Send(mode)) => {
+                match mode {
+                    ControlMode::Reset => self.motors_asked = Some(now),
+                    ControlMode::Off => self.motors_asked = None,
+                    ControlMode::Lock | ControlMode::Follow | ControlMode::Mapping => {}
+                }
+                self.send_mode(device, mode);
+            }
             Some(mode_change::Step::Done(asker, result)) => {
                 self.mode_change = None;
                 match asker {
@@ -235,7 +244,7 @@ impl GremsyDriver {
     pub(super) fn steer_on(&mut self, now: Timestamp, device: MavId) {
         if let Some(change) = &mut self.mode_change {
             let step = change.handle_timeout(now);
-            self.handle_mode_step(device, step);
+            self.handle_mode_step(now, device, step);
         }
         self.stop_on_in_v2(now, device);
         if self.search.decided() != Some(Generation::V2) {

@@ -70,7 +70,7 @@ impl GremsyDriver {
         }
         if let (Some(change), Some(device)) = (self.mode_change, self.device) {
             let step = change.handle_flags(status.flags);
-            self.handle_mode_step(device, step);
+            self.handle_mode_step(now, device, step);
         }
         let status = GimbalStatus { failures: status.failures | self.failures(), ..status };
         let is_wrong = self.version().is_some_and(|version| version.has_wrong_earth_yaw());
@@ -97,9 +97,10 @@ impl GremsyDriver {
         self.outputs.push_back(DriverOutput::Report(Report::Attitude(status)));
         let pose = Pose { pitch: status.attitude.angles().pitch, yaw: status.attitude.yaw() };
         let limits = FailureFlags::AT_PITCH_LIMIT | FailureFlags::AT_YAW_LIMIT | FailureFlags::AT_ROLL_LIMIT;
-        let motors_off = self.heard.status.is_some_and(|(_, status)| !status.motors_on());
-        let at_limit = status.failures.intersects(limits) || motors_off;
-        match self.effect.handle_report(now, pose, at_limit) {
+        if self.heard.status.is_some_and(|(_, status)| !status.motors_on()) {
+            return self.effect.pause();
+        }
+        match self.effect.handle_report(now, pose, status.failures.intersects(limits)) {
             Some(Finding::Works) => self.faults.clear(|fault| *fault == Fault::NoEffect),
             Some(Finding::NoEffect) => self.raise(Fault::NoEffect),
             Some(Finding::InvertedPitch)

@@ -158,6 +158,51 @@ fn motors_that_stay_off_after_retract_are_named() {
     );
 }
 
+/// "motors off ≤ 200 ms / on takes 3.0 s" (gimbals 5.3), and the status comes once a second: until then it is no news that they
+/// do not run yet; that they are off, or do not come on, is.
+#[test]
+fn motors_that_are_being_switched_on_are_no_fault() {
+    use gimbald::gimbals::operation::Motors;
+    let off = || vec!["camera: motors are off".to_owned()];
+    for generation in [Generation::V1, Generation::V2] {
+        let (mut world, places) = running(generation);
+        take_control(&mut world);
+        assert_eq!(operate(&mut world, places, Operation::Motors(Motors::Off)), Some(Ok(())));
+        world.forget();
+        let id = OperationId(77);
+        let on = Asked::Operation(Operation::Motors(Motors::On));
+        world.input(Input::Asked { id, gimbal: "camera", asked: &on });
+        run(&mut world, places, Duration::from_millis(100));
+        point(&mut world, -20.0, 30.0);
+        run(&mut world, places, 8 * SECOND);
+        assert_eq!((texts(&world, places), faults(&world)), (vec![], vec![]), "{generation:?}");
+        assert_looks(&world, -20.0, 30.0);
+
+        take_control(&mut world);
+        assert_eq!(operate(&mut world, places, Operation::Motors(Motors::Off)), Some(Ok(())));
+        world.forget();
+        point(&mut world, -20.0, 10.0);
+        run(&mut world, places, SECOND);
+        assert_eq!(texts(&world, places), off(), "{generation:?}");
+        assert_eq!(faults(&world), ["it was told to move while its motors are off. Switch them on"]);
+    }
+}
+
+/// "RETRACT in v2 cuts motors": the next angle switches them on, and that takes as long.
+#[test]
+fn motors_that_return_after_a_retract_are_no_fault() {
+    for generation in [Generation::V1, Generation::V2] {
+        let allowed = GremsySettings { retract_allowed: true, ..GremsySettings::default() };
+        let (mut world, places) = running_with(device(generation), allowed);
+        demand(&mut world, places, [0.0, 0.0, NAN, NAN, 1.0]);
+        run(&mut world, places, 3 * SECOND);
+        demand(&mut world, places, [-10.0, 20.0, NAN, NAN, 0.0]);
+        run(&mut world, places, 8 * SECOND);
+        assert_eq!((texts(&world, places), faults(&world)), (vec![], vec![]), "{generation:?}");
+        assert_looks(&world, -10.0, 20.0);
+    }
+}
+
 /// Its status comes and its answers do not: the wire towards it, or the baud rate.
 #[test]
 fn a_gimbal_that_does_not_answer_is_named() {
