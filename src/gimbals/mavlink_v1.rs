@@ -2,6 +2,7 @@
 
 pub mod config;
 pub mod driver;
+mod obedience;
 pub mod packet;
 pub mod sim;
 

@@ -8,6 +8,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use super::config::{V1RadioControl, V1Settings};
+use super::obedience::{Finding, Obedience};
 use super::packet::{self, MountControl};
 use crate::geometry::{Angle, AngularRate, Attitude, AxisLimits, GimbalAngles, Limits, VehicleFrame};
 use crate::gimbals::boot_clock::BootClock;
@@ -22,7 +23,7 @@ use crate::gimbals::settings::Family;
 use crate::timers::TimerTable;
 use crate::timestamp::Timestamp;
 use crate::wire::dialect::{COMMAND_LONG_DATA, HEARTBEAT_DATA, MOUNT_ORIENTATION_DATA, MOUNT_STATUS_DATA, MessageData};
-use crate::wire::ids::{CapFlags, CommandResult, FailureFlags, GimbalFlags, mav_state, message};
+use crate::wire::ids::{CapFlags, CommandResult, FailureFlags, GimbalFlags, mav_state, message, mount_mode};
 use crate::wire::{Frame, MavId};
 
 /// A gimbal not heard for so long is lost: five heartbeats.
@@ -83,12 +84,29 @@ pub struct MavlinkV1Driver {
     /// It said that it is one, which has a family of its own.
     says_gremsy: bool,
     gremsy_questions_left: u8,
+    obedience: Obedience,
+    does_not_move: DoesNotMove,
     /// Where it is taken to look while it does not say so.
     assumed: GimbalAngles,
     assumed_at: Timestamp,
     timers: TimerTable<Timer>,
     outputs: VecDeque<DriverOutput>,
 }
+
+/// Whether it is known not to go where it is told to look; the pilot is told once.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct DoesNotMove {
+    is_so: bool,
+    is_told: bool,
+}
+
+/// What the pilot is told of it.
+const DOES_NOT_MOVE: &str = "is told angles but does not move";
+
+/// And what whoever looks into it is.
+const DOES_NOT_MOVE_AND_WHAT_TO_DO: &str = "it is told where to look and does not move. Check that its motors are on and \
+    that nothing blocks the camera; that no radio control of its own has it; that v1_configure is true if it wants \
+    DO_MOUNT_CONFIGURE first; the wire towards it; and its family";
 
 /// Who tells where it looks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -137,6 +155,8 @@ impl MavlinkV1Driver {
             clock: BootClock::default(),
             says_gremsy: false,
             gremsy_questions_left: GREMSY_QUESTIONS,
+            obedience: Obedience::default(),
+            does_not_move: DoesNotMove::default(),
             assumed: GimbalAngles::default(),
             assumed_at: Timestamp::ZERO,
             timers: TimerTable::default(),
@@ -168,6 +188,9 @@ impl MavlinkV1Driver {
             self.ready = true;
             self.send_when_due(now);
         }
+        if !ready {
+            self.obedience.pause();
+        }
         self.ready = ready;
     }
 
@@ -186,6 +209,8 @@ impl MavlinkV1Driver {
         self.wanted = None;
         self.sent = None;
         self.configuration = Configuration::Unknown;
+        self.obedience.forget();
+        self.does_not_move.is_so = false;
         self.timers.cancel(Timer::Send);
         self.report(Report::Restarted);
     }
@@ -252,6 +277,10 @@ impl MavlinkV1Driver {
         }
         self.carry_assumed_on(now);
         self.sent = Some((now, wanted));
+        self.obedience.handle_target(match wanted {
+            MountControl::Angles(angles) => Some([angles.pitch, angles.yaw]),
+            MountControl::Retract | MountControl::Neutral | MountControl::RadioControl => None,
+        });
         if silent {
             self.timers.cancel(Timer::Send);
             return;
@@ -300,6 +329,25 @@ impl MavlinkV1Driver {
         self.outputs.push_back(DriverOutput::Report(report));
     }
 
+    /// Looks whether it goes where it was told to look.
+    fn watch_obedience(&mut self, now: Timestamp, frame: &Frame<'_>, attitude: Attitude<VehicleFrame>) {
+        let mode = frame.decode::<MOUNT_STATUS_DATA>().map(|status| status.mount_mode);
+        if mode == Some(mount_mode::RC_TARGETING) || !self.ready {
+            return self.obedience.pause();
+        }
+        let GimbalAngles { pitch, yaw, .. } = attitude.gimbal_angles();
+        match self.obedience.handle_report(now, [pitch, yaw]) {
+            Some(Finding::Moves) => self.does_not_move.is_so = false,
+            Some(Finding::DoesNotMove) => {
+                self.does_not_move.is_so = true;
+                if !std::mem::replace(&mut self.does_not_move.is_told, true) {
+                    self.report(Report::Fault(DOES_NOT_MOVE));
+                }
+            }
+            None => {}
+        }
+    }
+
     fn lose(&mut self) {
         self.alive = false;
         self.ready = false;
@@ -311,6 +359,8 @@ impl MavlinkV1Driver {
         self.wanted = None;
         self.sent = None;
         self.configuration = Configuration::Unknown;
+        self.obedience.forget();
+        self.does_not_move.is_so = false;
         for timer in [Timer::Lost, Timer::Send, Timer::FeedbackMissing, Timer::OpenLoop] {
             self.timers.cancel(timer);
         }
@@ -350,7 +400,11 @@ impl GimbalDriver for MavlinkV1Driver {
                     self.handle_boot_ms(orientation.time_boot_ms);
                 }
                 if let Some(attitude) = packet::read_attitude(frame, self.settings.report_sign) {
-                    self.handle_attitude(now, frame.message_id() == MOUNT_STATUS_DATA::ID, attitude);
+                    let from_status = frame.message_id() == MOUNT_STATUS_DATA::ID;
+                    if !from_status || self.feedback != Feedback::Orientation {
+                        self.watch_obedience(now, frame, attitude);
+                    }
+                    self.handle_attitude(now, from_status, attitude);
                 }
             }
             _ => {}
@@ -417,6 +471,7 @@ impl GimbalDriver for MavlinkV1Driver {
                 Timer::Send => self.send_when_due(now),
                 Timer::FeedbackMissing => {
                     self.feedback = Feedback::OpenLoop;
+                    self.obedience.pause();
                     self.assumed_at = now;
                     self.report(Report::Known(self.identity(), capabilities(&self.settings)));
                     self.report_assumed(now);
@@ -435,7 +490,9 @@ impl GimbalDriver for MavlinkV1Driver {
     }
 
     fn details(&self, _now: Timestamp) -> GimbalDetails {
-        let faults = if self.says_gremsy { vec![gremsy::wrong_family(Family::MavlinkV1)] } else { Vec::new() };
+        let wrong_family = self.says_gremsy.then(|| gremsy::wrong_family(Family::MavlinkV1));
+        let does_not_move = self.does_not_move.is_so.then(|| DOES_NOT_MOVE_AND_WHAT_TO_DO.to_owned());
+        let faults = wrong_family.into_iter().chain(does_not_move).collect();
         GimbalDetails { faults, ..GimbalDetails::default() }
     }
 }

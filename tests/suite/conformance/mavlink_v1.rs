@@ -1,6 +1,7 @@
 //! A v1 gimbal behind the core: what it is told for what v2 clients ask, what they see of it, what it asks of the vehicle
 //! (gimbal notes 2.4 and 2.5).
 
+mod obedience;
 mod streams;
 
 use std::time::Duration;
