@@ -38,7 +38,7 @@ use crate::gimbals::capabilities::Capabilities;
 use crate::gimbals::operation::{Operation, OperationId};
 use crate::gimbals::report::{GimbalStatus, Identity};
 use crate::gimbals::setpoint::Setpoint;
-use crate::gimbals::settings::GimbalSettings;
+use crate::gimbals::settings::{Family, GimbalSettings};
 use crate::timestamp::Timestamp;
 use crate::vehicle::Vehicle;
 use crate::wire::dialect::MavMessage;
@@ -156,6 +156,8 @@ pub struct GimbalManager {
     identity: Identity,
     capabilities: Option<Capabilities>,
     readiness: ReadinessWatch,
+    /// Whether it is a v2 device is known, and so the device id that it has to clients.
+    has_settled_id: bool,
     status: Option<(Timestamp, GimbalStatus)>,
     /// A sign of the device was heard, and it was not lost since.
     is_heard: bool,
@@ -201,6 +203,7 @@ impl GimbalManager {
     /// `number`: the device id that is kept for the gimbal in case that it is no v2 device, 1 to 6.
     pub fn new(settings: GimbalSettings, rules: ControlSettings, number: Option<u8>) -> Self {
         let always_spoken_for = settings.family.speaks_through_manager();
+        let has_settled_id = matches!(settings.family, Family::MavlinkV2 | Family::MavlinkV1);
         let mount_reports = MountReports::new(settings.v1_status);
         Self {
             tracking: Tracking::new(settings.setpoint_rate_hz),
@@ -211,6 +214,7 @@ impl GimbalManager {
             identity: Identity::default(),
             capabilities: None,
             readiness: ReadinessWatch::default(),
+            has_settled_id,
             status: None,
             is_heard: false,
             rotation: None,

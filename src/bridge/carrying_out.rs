@@ -34,7 +34,7 @@ impl Bridge {
         }
         self.turning = turning;
         let named = self.roster.iter().take(64).enumerate().filter(|(at, _)| turning & 1 << at != 0);
-        let names: String = named.map(|(_, gimbal)| format!("{}\n", gimbal.manager.settings().name)).collect();
+        let names: String = named.map(|(_, gimbal)| format!("{}\n", gimbal.turning_line())).collect();
         self.outbox.push_turning(names);
     }
 

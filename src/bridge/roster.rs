@@ -22,6 +22,9 @@ use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 use crate::wire::ids::{component, mav_type};
 
+/// Stands between the name of a gimbal that was left turning and the family whose words stop it.
+const TURNS_AS: char = '\t';
+
 /// A gimbal with its manager and driver.
 #[derive(Debug)]
 pub struct Gimbal {
@@ -102,6 +105,15 @@ impl Gimbal {
     /// Whether its manager sends heartbeats: 191 always does, others from when their gimbal is known.
     pub fn beats(&self) -> bool {
         self.component == component::ONBOARD_COMPUTER || self.manager.device().is_some()
+    }
+
+    /// What is kept for the next run of one that turns: its name, and whose words stop it where only we know.
+    pub fn turning_line(&self) -> String {
+        let name = &self.manager.settings().name;
+        match self.driver.stops_as() {
+            Some(family) => format!("{name}{TURNS_AS}{}", family.name()),
+            None => name.clone(),
+        }
     }
 
     /// Whether it may be turning as it was told.
@@ -281,10 +293,16 @@ impl Roster {
     }
 
     fn stop_if_left_turning(&mut self, at: usize) {
-        let manager = &mut self.gimbals[at].manager;
-        let name = &manager.settings().name;
-        if let Some(left) = self.left_turning.iter().position(|turning| turning == name) {
-            self.left_turning.swap_remove(left);
+        let Gimbal { manager, driver, .. } = &mut self.gimbals[at];
+        let name = manager.settings().name.as_str();
+        let read =
+            |line: &str| line.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with(TURNS_AS));
+        if let Some(left) = self.left_turning.iter().position(|line| read(line)) {
+            let line = self.left_turning.swap_remove(left);
+            let family = line.strip_prefix(name).and_then(|rest| rest.strip_prefix(TURNS_AS));
+            if family == Some(Family::Gremsy.name()) {
+                driver.stop_as(Family::Gremsy);
+            }
             manager.stop_when_heard();
         }
     }

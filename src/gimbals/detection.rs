@@ -19,9 +19,10 @@ use super::operation::{Operation, OperationId};
 use super::report::Report;
 use super::setpoint::{Setpoint, Turning};
 use super::settings::{Family, GimbalSettings};
+use crate::geometry::AngularRate;
 use crate::timers::TimerTable;
 use crate::timestamp::Timestamp;
-use crate::wire::dialect::COMMAND_LONG_DATA;
+use crate::wire::dialect::{COMMAND_LONG_DATA, MavMessage};
 use crate::wire::ids::message;
 use crate::wire::{Frame, MavId};
 
@@ -54,6 +55,8 @@ pub struct Detection {
     is_reported: bool,
     /// How it was last told to turn, while it is not told anything else.
     turning: Option<Turning>,
+    /// An earlier run found out that these words stop it.
+    stops_as: Option<Family>,
     timers: TimerTable<Timer>,
     outputs: VecDeque<DriverOutput>,
 }
@@ -87,6 +90,7 @@ impl Detection {
             evidence: Evidence::default(),
             is_reported: false,
             turning: None,
+            stops_as: None,
             timers: TimerTable::default(),
             outputs: VecDeque::new(),
         }
@@ -103,6 +107,10 @@ impl Detection {
     fn take(&mut self, now: Timestamp, family: Family) {
         let Some(device) = self.device.filter(|_| self.family() != family) else { return };
         tracing::info!(%device, family = family.name(), "the gimbal's family is known");
+        // What is only taken for a v1 gimbal may turn out to be what it was.
+        if family != Family::MavlinkV1 {
+            self.stops_as = None;
+        }
         self.stop_judging();
         self.take_leave(now);
         // A Gremsy may be either, and says which.
@@ -161,11 +169,24 @@ impl Detection {
                 if (!self.evidence.v2 || self.other.is_some()) && is_of_v2(frame) =>
             {
                 self.evidence.v2 = true;
+                self.stops_as = None;
                 self.stop_judging();
+                if self.family() == Family::MavlinkV2 {
+                    self.outputs.push_back(DriverOutput::Report(Report::SpeaksForItself(true)));
+                }
                 self.take(now, Family::MavlinkV2);
             }
             message::MOUNT_ORIENTATION | message::MOUNT_STATUS => self.evidence.v1_attitude = true,
             _ => {}
+        }
+    }
+
+    /// A Gremsy of the first generation hears no zeros of v2. To a plain v1 gimbal its own are angles, so they are only for
+    /// what is known to have been one.
+    fn stop_as_before(&mut self) {
+        if let (Some(device), Some(Family::Gremsy)) = (self.device, self.stops_as) {
+            let zeros = gremsy::packet::turn_at(device, [AngularRate::ZERO; 3]);
+            self.outputs.push_back(DriverOutput::Message(Box::new(MavMessage::COMMAND_LONG(zeros))));
         }
     }
 
@@ -221,7 +242,8 @@ impl GimbalDriver for Detection {
     }
 
     fn adopt(&mut self, now: Timestamp, device: MavId) {
-        *self = Self { outputs: std::mem::take(&mut self.outputs), ..Self::new(self.settings.clone()) };
+        let (outputs, stops_as) = (std::mem::take(&mut self.outputs), self.stops_as);
+        *self = Self { outputs, stops_as, ..Self::new(self.settings.clone()) };
         self.device = Some(device);
         self.v2.adopt(now, device);
         self.collect();
@@ -256,6 +278,9 @@ impl GimbalDriver for Detection {
         };
         self.in_use().handle_setpoint(now, setpoint);
         self.collect();
+        if matches!(setpoint, Setpoint::Turn(turning) if turning.is_zero()) {
+            self.stop_as_before();
+        }
     }
 
     fn handle_command_outcome(&mut self, now: Timestamp, command: &COMMAND_LONG_DATA, outcome: CommandOutcome) {
@@ -284,6 +309,14 @@ impl GimbalDriver for Detection {
             }
         }
         self.collect();
+    }
+
+    fn stops_as(&self) -> Option<Family> {
+        Some(self.family()).filter(|family| *family == Family::Gremsy).or(self.stops_as)
+    }
+
+    fn stop_as(&mut self, family: Family) {
+        self.stops_as = Some(family);
     }
 
     fn may_be_turning(&self) -> bool {

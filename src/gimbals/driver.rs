@@ -43,6 +43,15 @@ pub trait GimbalDriver: std::fmt::Debug {
         false
     }
 
+    /// The family whose words stop it, where the configuration leaves that open and it is known: the next run stops in these
+    /// words what this one could not.
+    fn stops_as(&self) -> Option<Family> {
+        None
+    }
+
+    /// An earlier run left it turning, and knew that `family`'s words stop it.
+    fn stop_as(&mut self, _family: Family) {}
+
     fn poll_output(&mut self) -> Option<DriverOutput>;
 
     fn poll_timeout(&self) -> Option<Timestamp>;

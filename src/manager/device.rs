@@ -67,11 +67,17 @@ impl GimbalManager {
                 self.leave_turning();
                 self.stop_what_was_left_turning(now);
             }
-            Report::SpeaksForItself(itself) => self.speak_for_device(now, !itself),
+            Report::SpeaksForItself(itself) => {
+                self.speak_for_device(now, !itself);
+                if !std::mem::replace(&mut self.has_settled_id, true) {
+                    self.broadcast_status(now);
+                }
+            }
             Report::Known(identity, capabilities) => {
                 let changed = self.identity != identity || self.capabilities != Some(capabilities);
                 self.identity = identity;
                 self.capabilities = Some(capabilities);
+                self.has_settled_id = true;
                 self.stop_what_was_left_turning(now);
                 if changed {
                     let (vendor, model) = (&self.identity.vendor, &self.identity.model);

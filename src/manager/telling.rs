@@ -71,8 +71,11 @@ impl GimbalManager {
         self.voice.as_ref()?.attitude_status(now, is_alive, is_locked, heading).map(Box::new)
     }
 
-    /// 281, once there is a gimbal.
+    /// 281, once there is a gimbal whose device id is known: what it speaks decides on it.
     pub(super) fn status_message(&self, now: Timestamp) -> Option<Box<MavMessage>> {
+        if !self.has_settled_id {
+            return None;
+        }
         let (primary, secondary) = (self.control.primary(), self.control.secondary());
         Some(Box::new(messages::status(now, self.device_id()?, self.flags(), primary, secondary)))
     }

@@ -1,22 +1,28 @@
 //! `family = "auto"`: what a gimbal speaks is found out by listening, and nothing of that moves it.
 
+use std::cell::Cell;
+use std::rc::Rc;
 use std::time::Duration;
 
+use gimbald::bridge::settings::Settings;
 use gimbald::geometry::Angle;
 use gimbald::gimbals::detection::{V1_BY_ITS_ATTITUDE_AFTER, V1_BY_ITS_SILENCE_AFTER};
 use gimbald::gimbals::gremsy::sim as gremsy;
 use gimbald::gimbals::gremsy::version::FirmwareVersion;
 use gimbald::gimbals::mavlink_v1::sim::{Device, DeviceSettings, Feedback};
+use gimbald::gimbals::mavlink_v2::sim as v2;
+use gimbald::sim::peer::{Peer, PlatformMotion};
 use gimbald::sim::plant::PlantSettings;
 use gimbald::sim::vehicle::{Vehicle, VehicleSettings};
 use gimbald::timestamp::Timestamp;
-use gimbald::wire::MavId;
 use gimbald::wire::dialect::{
     COMMAND_LONG_DATA, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA,
-    GIMBAL_DEVICE_SET_ATTITUDE_DATA, GIMBAL_MANAGER_INFORMATION_DATA, MavMessage, PARAM_REQUEST_READ_DATA,
-    PARAM_VALUE_DATA,
+    GIMBAL_DEVICE_SET_ATTITUDE_DATA, GIMBAL_MANAGER_INFORMATION_DATA, GIMBAL_MANAGER_STATUS_DATA, MavMessage,
+    PARAM_REQUEST_READ_DATA, PARAM_VALUE_DATA,
 };
+use gimbald::wire::{DatagramFrames, MavId};
 
+use crate::support::hub::Watched;
 use crate::support::script::{
     ACCEPTED, NAN, TEMPORARILY_REJECTED, command_long, device_information, gimbal_heartbeat, ground_heartbeat, of,
     pitch_yaw_deg, usual_capabilities,
@@ -163,6 +169,133 @@ fn a_gremsy_of_the_first_generation_is_known_by_its_parameters() {
         assert_eq!((gimbal.state.as_str(), gimbal.device_id), ("alive", Some(1)), "{firmware:?}");
         assert_eq!(mount_commands(&mut world, places), [], "nobody has asked for anything");
     }
+}
+
+/// D2: "a v2 device: its own component id in 280/281 … Any other gimbal: 1..6": which it is decides on the id, and before
+/// that is known no 281 tells one, as no 280 does.
+#[test]
+fn no_status_tells_an_id_that_the_gimbal_turns_out_not_to_have() {
+    for (kind, id) in [("v1", 1), ("silent v1", 1), ("gremsy v1", 1), ("gremsy v2", 154), ("v2", 154)] {
+        let (mut world, places) = match kind {
+            "v1" => with_v1_gimbal(Feedback::Orientation),
+            "silent v1" => with_v1_gimbal(Feedback::Nothing),
+            _ => {
+                let (mut world, places) = World::empty(three_links());
+                world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
+                let of = gremsy::DeviceSettings::of;
+                match kind {
+                    "gremsy v1" => {
+                        let settings = of(gremsy::Generation::V1);
+                        world.install(places.gimbal, gremsy::Device::new(Timestamp::ZERO, settings));
+                    }
+                    "gremsy v2" => {
+                        let settings = of(gremsy::Generation::V2);
+                        world.install(places.gimbal, gremsy::Device::new(Timestamp::ZERO, settings));
+                    }
+                    _ => world.install(places.gimbal, v2::Device::new(Timestamp::ZERO, Default::default())),
+                }
+                (world, places)
+            }
+        };
+        run(&mut world, places, 40 * SECOND);
+        let statuses: Vec<GIMBAL_MANAGER_STATUS_DATA> = of(&from_manager(world.take(places.ground)));
+        let ids: Vec<u8> = statuses.iter().map(|status| status.gimbal_device_id).collect();
+        assert!(ids.len() > 75 && ids.iter().all(|told| *told == id), "{kind} {ids:?}");
+    }
+}
+
+/// A Gremsy that does not answer any more what it was known by.
+#[derive(Debug)]
+struct Forgetful {
+    device: gremsy::Device,
+    is_mute: Rc<Cell<bool>>,
+}
+
+impl Peer for Forgetful {
+    fn handle_received(&mut self, now: Timestamp, bytes: &[u8]) {
+        self.device.handle_received(now, bytes);
+    }
+
+    fn handle_timeout(&mut self, now: Timestamp) {
+        self.device.handle_timeout(now);
+    }
+
+    fn poll_output(&mut self) -> Option<Vec<u8>> {
+        loop {
+            let bytes = self.device.poll_output()?;
+            let id = DatagramFrames::new(&bytes).next_frame().expect("a frame").message_id();
+            if !self.is_mute.get() || !matches!(id, 22 | 283) {
+                return Some(bytes);
+            }
+        }
+    }
+
+    fn poll_timeout(&self) -> Option<Timestamp> {
+        self.device.poll_timeout()
+    }
+
+    fn handle_reboot(&mut self, now: Timestamp) {
+        self.device.handle_reboot(now);
+    }
+
+    fn handle_disturbance(&mut self, now: Timestamp, motion: PlatformMotion) {
+        self.device.handle_disturbance(now, motion);
+    }
+}
+
+/// "A gimbal that turns after its operator is gone is our worst bug": one that hears only what an earlier run found out that it
+/// speaks is stopped in these words at its first sign, also when that run was killed and the next one is before it has
+/// found out the same.
+#[test]
+fn a_gremsy_that_was_left_turning_is_stopped_before_it_is_known_again() {
+    let gremsy::DeviceSettings { plant, .. } = gremsy::DeviceSettings::of(gremsy::Generation::V1);
+    let settings = gremsy::DeviceSettings {
+        firmware: FirmwareVersion::official(7, 5, 6),
+        plant: PlantSettings { noise: Angle::ZERO, ..plant },
+        ..gremsy::DeviceSettings::of(gremsy::Generation::V1)
+    };
+    let (mut world, places) = World::empty(three_links());
+    world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
+    let is_mute = Rc::new(Cell::new(false));
+    let device = gremsy::Device::new(Timestamp::ZERO, settings);
+    let device = Watched::new(Forgetful { device, is_mute: is_mute.clone() });
+    let yaw = || device.look().device.plant().pose().yaw.degrees();
+    world.install(places.gimbal, device.clone());
+    run(&mut world, places, 30 * SECOND);
+    assert_eq!(turn(&mut world, places, 5.0), Some(ACCEPTED));
+    run(&mut world, places, SECOND);
+    assert_eq!(world.stored_turning, ["gimbal-154\tgremsy"]);
+
+    is_mute.set(true);
+    for life in 0..2 {
+        world.kill();
+        world.run_for(SECOND / 2);
+        let before = yaw();
+        let left_turning = world.stored_turning.clone();
+        assert_eq!(left_turning, ["gimbal-154\tgremsy"], "{life}");
+        world.start(Settings { left_turning, ..three_links() });
+        run(&mut world, places, SECOND * 13 / 10);
+        // It beats once a second.
+        let stopped = yaw();
+        assert!((stopped - before).abs() < 6.0, "{life}: {before} {stopped}");
+        run(&mut world, places, SECOND);
+        assert!((yaw() - stopped).abs() < 0.1, "{life}: it turns on");
+        assert_eq!(family(&world), "mavlink_v2", "nothing else is known of it");
+    }
+    run(&mut world, places, 10 * SECOND);
+    assert_eq!(world.stored_turning, Vec::<String>::new());
+}
+
+/// To a plain v1 gimbal zeros are angles: it is not told them.
+#[test]
+fn a_gimbal_that_is_not_known_to_be_a_gremsy_is_told_no_zeros_of_v1() {
+    let (mut world, places) = with_v1_gimbal(Feedback::Orientation);
+    world.kill();
+    world.start(Settings { left_turning: vec!["gimbal-154".to_owned()], ..three_links() });
+    run(&mut world, places, V1_BY_ITS_ATTITUDE_AFTER);
+    let heard = world.take(places.gimbal);
+    assert!(of::<GIMBAL_DEVICE_SET_ATTITUDE_DATA>(&heard).len() > 5);
+    assert!(of::<COMMAND_LONG_DATA>(&heard).iter().all(|command| command.command != 205));
 }
 
 /// One of the v2 generation says who made it, and speaks for itself.

@@ -56,11 +56,14 @@ fn item_15_the_one_autopilot_gives_us_its_system_id() {
     let (mut world, places) = World::empty(auto());
     let autopilot = (SECOND, places.autopilot, MavId::new(7, 1), px4_heartbeat());
     let gimbal = (SECOND, places.gimbal, MavId::new(7, 154), gimbal_heartbeat());
+    // Without it there is no status: what it speaks decides on the id that it has there.
+    let information = MavMessage::GIMBAL_DEVICE_INFORMATION(device_information(world.now, usual_capabilities()));
+    let information = (SECOND, places.gimbal, MavId::new(7, 154), information);
 
     world.run_with(Duration::from_micros(2_999_999), &[autopilot.clone(), gimbal.clone()]);
     assert_eq!(own_frames(&mut world, places, 191), 0, "nothing before the window is over");
 
-    world.run_with(Duration::from_secs(10), &[autopilot, gimbal]);
+    world.run_with(Duration::from_secs(10), &[autopilot, gimbal, information]);
     for place in [places.autopilot, places.gimbal, places.ground] {
         let own: Vec<Arrival> = world.take(place).into_iter().filter(|at| at.source().component == 191).collect();
         assert!(own.len() > 10, "heartbeats and status");

@@ -122,7 +122,10 @@ impl Court {
     fn new(takeover: Takeover) -> Self {
         let settings = GimbalSettings { takeover, ..GimbalSettings::found("camera".to_owned()) };
         let mut manager = GimbalManager::new(settings, ControlSettings::default(), None);
-        around(|around| manager.handle_report(START, Report::Alive { device: GIMBAL }, around));
+        // Before it is known whether it is a v2 device, no status tells an id of it.
+        for report in [Report::Alive { device: GIMBAL }, Report::SpeaksForItself(true)] {
+            around(|around| manager.handle_report(START, report, around));
+        }
         while manager.poll_output().is_some() {}
         Self { rule: Rule::new(takeover, AUTOPILOT, &[GCS]), said: Vec::new(), manager }
     }
