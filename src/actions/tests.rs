@@ -1,6 +1,6 @@
 use super::*;
 use crate::geometry::{Angle, AngularRate, YawFrame};
-use crate::gimbals::operation::{Axis, AxisMotion, RadioType, Stream, StreamRate};
+use crate::gimbals::operation::{Axis, AxisMotion, RadioType, ResetMode, Stream, StreamRate};
 use crate::manager::request::AxisDemand;
 
 fn read(command: &str, in_path: Option<&str>, body: &str) -> Result<Asked, String> {
@@ -12,7 +12,7 @@ fn read(command: &str, in_path: Option<&str>, body: &str) -> Result<Asked, Strin
 fn every_command_and_every_path_is_there_once() {
     for (at, action) in ACTIONS.iter().enumerate() {
         for other in &ACTIONS[..at] {
-            assert_ne!((action.path, action.command), (other.path, action.command));
+            assert_ne!(action.path, other.path);
             assert_ne!(action.command, other.command);
         }
         assert_eq!(action.path.contains('{'), action.path_field().is_some(), "{}", action.path);
@@ -129,6 +129,30 @@ fn what_is_right_is_asked() {
         ("home-on-mode-change", None, r#"{"enabled": true}"#, Operation::SetHomeOnModeChange(true)),
     ] {
         assert_eq!(read(command, in_path, body), Ok(Asked::Operation(operation)), "{command}");
+    }
+}
+
+/// Whatever has several values is asked for by the name of each.
+#[test]
+fn every_name_is_read_as_what_it_names() {
+    let asked = |operation| Ok(Asked::Operation(operation));
+    for kind in RadioType::ALL {
+        let body = format!(r#"{{"type": "{}"}}"#, kind.name());
+        assert_eq!(read("radio-type", None, &body), asked(Operation::SetRadioType(kind)));
+    }
+    for mode in ResetMode::ALL {
+        let body = format!(r#"{{"mode": "{}"}}"#, mode.name());
+        assert_eq!(read("reset", None, &body), asked(Operation::Reset(mode)));
+    }
+    for stream in Stream::ALL {
+        let body = format!(r#"{{"stream": "{}", "rate_hz": "default"}}"#, stream.name());
+        let operation = Operation::SetStreamRate { stream, rate: StreamRate::Default };
+        assert_eq!(read("stream-rate", None, &body), asked(operation));
+    }
+    for axis in Axis::ALL {
+        let motion = AxisMotion { control_speed_dps: Some(7.0), ..AxisMotion::default() };
+        let body = r#"{"control_speed_dps": 7}"#;
+        assert_eq!(read("axis", Some(axis.name()), body), asked(Operation::SetAxisMotion { axis, motion }));
     }
 }
 
