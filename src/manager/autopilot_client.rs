@@ -140,7 +140,7 @@ impl GimbalManager {
 
     fn obey_autopilot(&mut self, now: Timestamp, autopilot: MavId, demand: &Demand, around: Surroundings<'_>) {
         // Control is not borrowed for what cannot be done.
-        let done = self.steerable().map(|_| ()).and_then(|()| {
+        let done = self.check_demand(now, demand, around).and_then(|()| {
             self.take_for_autopilot(now, autopilot, around).inspect_err(|_| {
                 self.autopilot_client.stream.overrule(now);
             })?;
@@ -161,6 +161,12 @@ impl GimbalManager {
                 }
             }
         }
+    }
+
+    /// Whether a demand could be carried out if the gate let it pass.
+    fn check_demand(&self, now: Timestamp, demand: &Demand, around: Surroundings<'_>) -> Result<(), Refusal> {
+        let capabilities = self.steerable()?;
+        self.tracking.check_demand(now, demand, &self.situation(now, capabilities, around), self.timeouts())
     }
 
     /// Takes control for a new demand where the gate would refuse it.

@@ -108,6 +108,17 @@ impl Tracking {
         Ok(())
     }
 
+    /// Whether a demand could be carried out.
+    pub fn check_demand(
+        &self,
+        now: Timestamp,
+        demand: &Demand,
+        situation: &Situation<'_>,
+        timeouts: RateTimeouts,
+    ) -> Result<(), Refusal> {
+        self.read_demand(now, demand, situation, timeouts).map(|_| ())
+    }
+
     /// Points at a place until something else is demanded.
     pub fn point_at(
         &mut self,

@@ -7,6 +7,7 @@ use gimbald::gimbals::settings::{GimbalSettings, Takeover};
 use gimbald::manager::settings::ControlSettings;
 use gimbald::timestamp::Timestamp;
 use gimbald::wire::dialect::{COMMAND_ACK_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA, MavMessage};
+use gimbald::wire::ids::CapFlags;
 
 use proptest::prelude::*;
 
@@ -365,6 +366,24 @@ fn a_place_named_to_the_device_is_looked_at() {
     // Nobody else names places to the device.
     let from_station = flight.world.ask(flight.places.autopilot, GCS, &north);
     assert_eq!(of::<COMMAND_ACK_DATA>(&from_station)[0].result, 3);
+}
+
+/// Nor is it borrowed for a setpoint that cannot be carried out, such as a retraction of a gimbal that knows none.
+#[test]
+fn a_demand_that_cannot_be_done_borrows_nothing() {
+    let mut flight = Flight::new(presenting());
+    let capabilities = usual_capabilities().difference(CapFlags::HAS_RETRACT);
+    introduce(&mut flight.world, flight.places, capabilities);
+    assert_eq!(flight.command(&take_control()), Some(ACCEPTED));
+    assert_eq!(flight.command(&pitchyaw(NAN, NAN, 0.0, 5.0, 44.0)), Some(ACCEPTED));
+
+    flight.demand(setpoint(-30.0, 0.0, 1), 2 * SECOND);
+
+    let gimbal = flight.world.snapshot().gimbals[0].clone();
+    assert_eq!(flight.holders(), (station(), None));
+    assert_eq!(gimbal.rejected["1/1"]["cannot_retract"], 1);
+    let setpoint = gimbal.setpoint.expect("it turns");
+    assert_eq!((setpoint.mode.as_str(), setpoint.source), ("rate", station()));
 }
 
 /// Control is not borrowed for a place that cannot be looked at: whoever has it keeps it, and goes on turning.
