@@ -294,7 +294,7 @@ mod tests {
                 &["--gremsy-firmware", "7.8.6"],
                 DeviceSettings { firmware: FirmwareVersion::official(7, 8, 6), ..usual.clone() },
             ),
-            (&["--gremsy-rc-type", "joystick"], DeviceSettings { rc_type: RcType::Joystick, ..usual.clone() }),
+            (&["--gremsy-rc-type", "joystick"], DeviceSettings { rc_type: RcType::from_code(2), ..usual.clone() }),
             (&["--gremsy-rc-type", "15"], DeviceSettings { rc_type: RcType::Other(15), ..usual.clone() }),
             (&["--gremsy-quiet"], DeviceSettings { has_usual_streams: false, ..usual.clone() }),
             (&["--gremsy-inverted-pitch"], DeviceSettings { has_inverted_pitch: true, ..usual.clone() }),

@@ -2,7 +2,7 @@
 //!
 //! | Id | Message | Content |
 //! |---|---|---|
-//! | 76 | `COMMAND_LONG` 204 `DO_MOUNT_CONFIGURE` | p1 = 3: the RC receiver steers; p1 = 2: what each axis takes (firmware up to 2021) |
+//! | 76 | `COMMAND_LONG` 204 `DO_MOUNT_CONFIGURE` | p1 = 3: the RC receiver steers |
 //! | 76 | `COMMAND_LONG` 205 `DO_MOUNT_CONTROL` | p1 pitch, p2 roll, p3 yaw in degrees or degrees per second, p6 = 1 angles or 2 rates, p7 = 2 (v1) |
 //! | 76 | `COMMAND_LONG` 246 `PREFLIGHT_REBOOT_SHUTDOWN` | p4 = 1, or p3 the action and p4 = 154 |
 //! | 76 | `COMMAND_LONG` 31010 `USER_1` | p7 = 1 motors on, 0 off (v1) |
@@ -13,6 +13,7 @@
 //! Up and right are positive. 204, 246, 511 and 512 are the same in both generations.
 
 use crate::geometry::{AngularRate, GimbalAngles};
+use crate::gimbals::operation::ResetMode;
 use crate::wire::MavId;
 use crate::wire::dialect::COMMAND_LONG_DATA;
 use crate::wire::ids::{command, component, mount_mode};
@@ -33,45 +34,21 @@ impl InputMode {
     }
 }
 
-/// A way to go back to a start: the vendor's `gimbal_reset_mode_t`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ResetMode {
-    Yaw,
-    /// The vendor's "return home".
-    PitchAndYaw,
-    PitchDownUpAndYaw,
-    PitchDownUp,
-    PitchMapping,
+/// The number of a reset in the vendor's `gimbal_reset_mode_t`.
+pub const fn reset_code(mode: ResetMode) -> u8 {
+    match mode {
+        ResetMode::Yaw => 1,
+        // The vendor's "return home".
+        ResetMode::PitchAndYaw => 3,
+        ResetMode::PitchDownUpAndYaw => 11,
+        ResetMode::PitchDownUp => 12,
+        ResetMode::PitchMapping => 13,
+    }
 }
 
-impl ResetMode {
-    pub const ALL: [Self; 5] =
-        [Self::Yaw, Self::PitchAndYaw, Self::PitchDownUpAndYaw, Self::PitchDownUp, Self::PitchMapping];
-
-    pub const fn code(self) -> u8 {
-        match self {
-            Self::Yaw => 1,
-            Self::PitchAndYaw => 3,
-            Self::PitchDownUpAndYaw => 11,
-            Self::PitchDownUp => 12,
-            Self::PitchMapping => 13,
-        }
-    }
-
-    pub fn from_code(code: u8) -> Option<Self> {
-        Self::ALL.into_iter().find(|mode| mode.code() == code)
-    }
-
-    /// As a person writes it.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Yaw => "yaw",
-            Self::PitchAndYaw => "pitch_and_yaw",
-            Self::PitchDownUpAndYaw => "pitch_down_up_and_yaw",
-            Self::PitchDownUp => "pitch_down_up",
-            Self::PitchMapping => "pitch_mapping",
-        }
-    }
+/// The reset of that number.
+pub fn reset_of(code: u8) -> Option<ResetMode> {
+    ResetMode::ALL.into_iter().find(|mode| reset_code(*mode) == code)
 }
 
 /// What parameter 7 of `USER_2` asks for.
@@ -88,43 +65,16 @@ pub enum RebootAction {
     Shutdown,
 }
 
-/// How an axis of a gimbal up to 2021 takes its number: parameters 5 to 7 of `DO_MOUNT_CONFIGURE`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AxisInput {
-    AngleInVehicleFrame,
-    Rate,
-    AngleInEarthFrame,
-}
-
-impl AxisInput {
-    const fn code(self) -> u8 {
-        match self {
-            Self::AngleInVehicleFrame => 0,
-            Self::Rate => 1,
-            Self::AngleInEarthFrame => 2,
-        }
-    }
-}
-
 /// How often a message is to come: the vendor's `rate_action_t`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MessageRate {
     Off,
     Default,
-    /// 1 to 50, 75 or 100.
+    /// The vendor offers 1 to 50, 75 and 100, and speaks of 200 at most.
     Hertz(u8),
 }
 
 impl MessageRate {
-    /// A rate that the vendor offers.
-    pub const fn from_hertz(hertz: u8) -> Option<Self> {
-        match hertz {
-            0 => Some(Self::Off),
-            1..=50 | 75 | 100 => Some(Self::Hertz(hertz)),
-            _ => None,
-        }
-    }
-
     /// Parameter 2 of `SET_MESSAGE_INTERVAL`.
     pub const fn interval_us(self) -> i32 {
         match self {
@@ -152,7 +102,7 @@ pub fn follow(device: MavId) -> COMMAND_LONG_DATA {
 
 /// Back to a start (v1).
 pub fn reset(device: MavId, mode: ResetMode) -> COMMAND_LONG_DATA {
-    set_mode(device, user_2::RESET, mode.code())
+    set_mode(device, user_2::RESET, reset_code(mode))
 }
 
 fn set_mode(device: MavId, mode: u8, reset: u8) -> COMMAND_LONG_DATA {
@@ -181,14 +131,6 @@ fn mount_control(device: MavId, pitch_roll_yaw: [f64; 3], input: InputMode) -> C
 pub fn hand_to_rc(device: MavId) -> COMMAND_LONG_DATA {
     let mode = f32::from(mount_mode::RC_TARGETING);
     command_long(device, command::DO_MOUNT_CONFIGURE, [mode, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-}
-
-/// Which of roll, tilt and pan are stabilised, and what each takes (firmware up to 2021).
-pub fn set_axes_mode(device: MavId, stabilised: [bool; 3], input: [AxisInput; 3]) -> COMMAND_LONG_DATA {
-    let [s1, s2, s3] = stabilised.map(|on| f32::from(u8::from(on)));
-    let [i1, i2, i3] = input.map(|input| f32::from(input.code()));
-    let mode = f32::from(mount_mode::MAVLINK_TARGETING);
-    command_long(device, command::DO_MOUNT_CONFIGURE, [mode, s1, s2, s3, i1, i2, i3])
 }
 
 /// Starts the gimbal again, in the form that every firmware knows. The vendor's SDK waits for no answer.

@@ -19,12 +19,6 @@ pub use limits::{AngleLimits, TiltSense};
 pub use motor_control::MotorControl;
 pub use tables::{ParameterTable, Row};
 
-use crate::wire::MavId;
-use crate::wire::dialect::{CharArray, PARAM_SET_DATA};
-
-/// `MAV_PARAM_TYPE_INT16`.
-pub const INT16: u8 = 4;
-
 /// The vendor's names for pitch, roll and yaw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
@@ -183,57 +177,9 @@ pub fn write(table: ParameterTable, parameter: Parameter, value: i16) -> Result<
     Ok(ParameterWrite { name, value })
 }
 
-/// `PARAM_SET` for `device`.
-pub fn parameter_set(device: MavId, write: ParameterWrite) -> PARAM_SET_DATA {
-    PARAM_SET_DATA {
-        param_value: f32::from(write.value),
-        target_system: device.system,
-        target_component: device.component,
-        param_id: CharArray::from(write.name),
-        param_type: INT16,
-    }
-}
-
-/// The number in a `PARAM_VALUE`; `None` when it is none that an int16 can be.
-pub fn parameter_value(param_value: f32) -> Option<i16> {
-    let rounded = param_value.round();
-    // NaN is in no range.
-    (f32::from(i16::MIN)..=f32::from(i16::MAX)).contains(&rounded).then_some(rounded as i16)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::encode_to_vec;
-
-    /// Gimbal statement 13: "PARAM_SET writes an int16 number as its float value with param_type 4; the golden
-    /// PARAM_SET frame matches."
-    #[test]
-    fn statement_13_a_parameter_is_set_as_the_golden_frame_has_it() {
-        let write = write(ParameterTable::New, Parameter::LimitMax(Axis::Tilt), 45).expect("in range");
-        assert_eq!(write, ParameterWrite { name: "RC_LIM_MAX_TILT", value: 45 });
-
-        #[rustfmt::skip]
-        let golden = [
-            0xfd, 0x17, 0x00, 0x00, 0x09, 0x01, 0xbf, 0x17, 0x00, 0x00, 0x00, 0x00, 0x34, 0x42, 0x01, 0x9a, 0x52, 0x43,
-            0x5f, 0x4c, 0x49, 0x4d, 0x5f, 0x4d, 0x41, 0x58, 0x5f, 0x54, 0x49, 0x4c, 0x54, 0x00, 0x04, 0x6a, 0xa1,
-        ];
-        assert_eq!(encode_to_vec(MavId::new(1, 191), 9, &parameter_set(MavId::new(1, 154), write)), golden);
-    }
-
-    #[test]
-    fn values_are_read_as_numbers() {
-        for (sent, expected) in [
-            (45.0, Some(45)),
-            (-90.0, Some(-90)),
-            (32_767.0, Some(i16::MAX)),
-            (32_768.0, None),
-            (f32::NAN, None),
-            (f32::INFINITY, None),
-        ] {
-            assert_eq!(parameter_value(sent), expected, "{sent}");
-        }
-    }
 
     #[test]
     fn what_cannot_be_set_is_named() {

@@ -22,7 +22,7 @@ use gimbald::gimbals::gremsy::config::GremsySettings;
 use gimbald::gimbals::gremsy::driver;
 use gimbald::gimbals::gremsy::sim::{Device, DeviceSettings, Generation};
 use gimbald::gimbals::gremsy::version::FirmwareVersion;
-use gimbald::gimbals::operation::{Operation, OperationId};
+use gimbald::gimbals::operation::{Operation, OperationId, ResetMode};
 use gimbald::gimbals::settings::{Family, GimbalSettings};
 use gimbald::manager::asked::{Answer, Asked};
 use gimbald::manager::request::AxisDemand;

@@ -10,8 +10,8 @@ use std::time::Duration;
 
 use super::rotation::Rotation;
 use crate::geometry::{AngularRate, GimbalAngles};
-use crate::gimbals::gremsy::packet::{self, ResetMode};
-use crate::gimbals::operation::YawMode;
+use crate::gimbals::gremsy::packet;
+use crate::gimbals::operation::{ResetMode, YawMode};
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 use crate::wire::dialect::COMMAND_LONG_DATA;

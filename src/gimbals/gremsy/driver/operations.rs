@@ -200,8 +200,8 @@ impl GremsyDriver {
             }
             Operation::SetYawMode(YawMode::Lock) => (packet::lock(device), Goal::Mode(YawMode::Lock)),
             Operation::SetYawMode(YawMode::Follow) => (packet::follow(device), Goal::Mode(YawMode::Follow)),
-            Operation::Mapping => (packet::reset(device, packet::ResetMode::PitchMapping), Goal::Answer),
-            Operation::Reset(mode) => (packet::reset(device, vendors_reset(*mode)), Goal::Answer),
+            Operation::Mapping => (packet::reset(device, ResetMode::PitchMapping), Goal::Answer),
+            Operation::Reset(mode) => (packet::reset(device, *mode), Goal::Answer),
             _ => return self.operated(id, Err(OperationError::Unsupported)),
         };
         self.ask(now, id, command, goal);
@@ -410,16 +410,6 @@ fn of_outcome(outcome: CommandOutcome) -> OperationResult {
         CommandOutcome::Answered(UNSUPPORTED) => Err(OperationError::UnsupportedByDevice),
         CommandOutcome::Answered(_) => Err(OperationError::Failed),
         CommandOutcome::Unanswered => Err(OperationError::NoAnswer),
-    }
-}
-
-const fn vendors_reset(mode: ResetMode) -> packet::ResetMode {
-    match mode {
-        ResetMode::Yaw => packet::ResetMode::Yaw,
-        ResetMode::PitchAndYaw => packet::ResetMode::PitchAndYaw,
-        ResetMode::PitchDownUpAndYaw => packet::ResetMode::PitchDownUpAndYaw,
-        ResetMode::PitchDownUp => packet::ResetMode::PitchDownUp,
-        ResetMode::PitchMapping => packet::ResetMode::PitchMapping,
     }
 }
 

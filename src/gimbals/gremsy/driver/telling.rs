@@ -221,7 +221,7 @@ impl GremsyDriver {
             return;
         }
         match self.number(Parameter::RcType).map(RcType::from_code) {
-            Some(RcType::Sync) => self.faults.clear(|fault| matches!(fault, Fault::RadioType(_))),
+            Some(RcType::SYNC) => self.faults.clear(|fault| matches!(fault, Fault::RadioType(_))),
             Some(kind) => self.raise(Fault::RadioType(kind)),
             None => {}
         }

@@ -5,7 +5,7 @@ use crate::gimbals::gremsy::parameters::{
     self, AngleLimits, Axis, AxisFlags, EncoderType, MotorControl, Parameter, ParameterError, ParameterTable,
     ParameterWrite, RcType, TiltSense,
 };
-use crate::gimbals::operation::{self, EncoderUnit, Operation, OperationError, RadioType};
+use crate::gimbals::operation::{self, EncoderUnit, Operation, OperationError};
 
 /// The parameters that `operation` sets, in `table`; `None` for an operation that is no setting. `value` gives what is
 /// known of the parameter with a name.
@@ -27,7 +27,7 @@ pub fn writes(
             let writes = limits.writes(table, TiltSense::of(table), axis_of(*axis)).map_err(refused)?;
             Ok(writes.to_vec())
         }),
-        Operation::SetRadioType(kind) => one(table, Parameter::RcType, radio_type(*kind).code()),
+        Operation::SetRadioType(kind) => one(table, Parameter::RcType, RcType::Named(*kind).code()),
         Operation::SetEncoderUnit(unit) => {
             let kind = match unit {
                 EncoderUnit::Counts => EncoderType::Counts,
@@ -117,26 +117,10 @@ fn angle_limits(limits: AxisLimits) -> Result<AngleLimits, OperationError> {
     Ok(AngleLimits { min_deg: degrees(limits.min())?, max_deg: degrees(limits.max())? })
 }
 
-const fn radio_type(kind: RadioType) -> RcType {
-    match kind {
-        RadioType::SbusFasst => RcType::SbusFasst,
-        RadioType::Joystick => RcType::Joystick,
-        RadioType::Jr11Bit => RcType::Jr11Bit,
-        RadioType::Jr10Bit => RcType::Jr10Bit,
-        RadioType::Ppm => RcType::Ppm,
-        RadioType::Sync => RcType::Sync,
-        RadioType::Lb2Single => RcType::Lb2Single,
-        RadioType::Lb2Normal => RcType::Lb2Normal,
-        RadioType::Sync2 => RcType::Sync2,
-        RadioType::SbusSfhss => RcType::SbusSfhss,
-        RadioType::Herelink => RcType::Herelink,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gimbals::operation::{AxisMotion, MotorAxis};
+    use crate::gimbals::operation::{AxisMotion, MotorAxis, RadioType};
 
     fn pairs(operation: &Operation, table: ParameterTable) -> Result<Vec<(&'static str, i16)>, String> {
         let value = |name: &str| (name == "RC_REVERSE_AXIS" || name == "JOY_AXIS").then_some(0x08);

@@ -3,69 +3,66 @@
 use std::fmt;
 
 use super::Axis;
+use crate::gimbals::operation::RadioType;
 
 /// Where control comes from (`RC_TYPE`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RcType {
-    SbusFasst,
-    Joystick,
-    Jr11Bit,
-    Jr10Bit,
-    Ppm,
-    /// MAVLink: with any other type setpoints are acknowledged and have no effect.
-    Sync,
-    Lb2Single,
-    Lb2Normal,
-    Sync2,
-    SbusSfhss,
-    Herelink,
-    /// A number that the published SDK does not name; newer firmware has 15.
+    /// One that the published SDK names.
+    Named(RadioType),
+    /// A number that it does not name; newer firmware has 15.
     Other(i16),
 }
 
 impl RcType {
-    const NAMED: [(Self, i16, &str); 11] = [
-        (Self::SbusFasst, 1, "sbus_fasst"),
-        (Self::Joystick, 2, "joystick"),
-        (Self::Jr11Bit, 4, "jr_11bit"),
-        (Self::Jr10Bit, 5, "jr_10bit"),
-        (Self::Ppm, 6, "ppm"),
-        (Self::Sync, 7, "sync"),
-        (Self::Lb2Single, 10, "lb2_single"),
-        (Self::Lb2Normal, 11, "lb2_normal"),
-        (Self::Sync2, 12, "sync2"),
-        (Self::SbusSfhss, 13, "sbus_sfhss"),
-        (Self::Herelink, 14, "herelink"),
-    ];
+    /// MAVLink: with any other type setpoints are acknowledged and have no effect.
+    pub const SYNC: Self = Self::Named(RadioType::Sync);
 
     pub fn from_code(code: i16) -> Self {
-        Self::NAMED.iter().find(|(_, known, _)| *known == code).map_or(Self::Other(code), |(kind, ..)| *kind)
+        RadioType::ALL.into_iter().find(|kind| radio_code(*kind) == code).map_or(Self::Other(code), Self::Named)
     }
 
-    pub fn code(self) -> i16 {
+    pub const fn code(self) -> i16 {
         match self {
+            Self::Named(kind) => radio_code(kind),
             Self::Other(code) => code,
-            named => Self::NAMED.iter().find(|(kind, ..)| *kind == named).map_or(0, |(_, code, _)| *code),
         }
     }
 
     /// The type that a person calls by its name.
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::NAMED.iter().find(|(_, _, known)| *known == name).map(|(kind, ..)| *kind)
+        RadioType::ALL.into_iter().find(|kind| kind.name() == name).map(Self::Named)
     }
 
     /// The names that [`from_name`](Self::from_name) knows.
     pub fn names() -> impl Iterator<Item = &'static str> {
-        Self::NAMED.iter().map(|(_, _, name)| *name)
+        RadioType::ALL.into_iter().map(RadioType::name)
+    }
+}
+
+/// The number of a radio type in the vendor's `rc_type_t`.
+const fn radio_code(kind: RadioType) -> i16 {
+    match kind {
+        RadioType::SbusFasst => 1,
+        RadioType::Joystick => 2,
+        RadioType::Jr11Bit => 4,
+        RadioType::Jr10Bit => 5,
+        RadioType::Ppm => 6,
+        RadioType::Sync => 7,
+        RadioType::Lb2Single => 10,
+        RadioType::Lb2Normal => 11,
+        RadioType::Sync2 => 12,
+        RadioType::SbusSfhss => 13,
+        RadioType::Herelink => 14,
     }
 }
 
 impl fmt::Display for RcType {
     /// As in `sync`; a type without a name is its number.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match Self::NAMED.iter().find(|(kind, ..)| kind == self) {
-            Some((_, _, name)) => f.write_str(name),
-            None => write!(f, "{}", self.code()),
+        match self {
+            Self::Named(kind) => f.write_str(kind.name()),
+            Self::Other(code) => write!(f, "{code}"),
         }
     }
 }
@@ -118,13 +115,6 @@ impl EncoderType {
             Self::Counts => 1,
         }
     }
-
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Angle => "angle",
-            Self::Counts => "counts",
-        }
-    }
 }
 
 #[cfg(test)]
@@ -158,7 +148,7 @@ mod tests {
             ]
         );
         assert_eq!((RcType::from_code(15).code(), RcType::from_code(15).to_string()), (15, "15".to_owned()));
-        assert_eq!(RcType::from_name("sync"), Some(RcType::Sync));
+        assert_eq!(RcType::from_name("sync"), Some(RcType::SYNC));
         assert_eq!(RcType::from_name("15"), None);
         assert_eq!(RcType::names().count(), 11);
     }

@@ -44,11 +44,6 @@ impl ParameterTable {
     pub fn name(self, parameter: Parameter) -> Option<&'static str> {
         self.rows().iter().find(|row| row.parameter == parameter).map(|row| row.name)
     }
-
-    /// What the parameter of this name is for.
-    pub fn parameter(self, name: &str) -> Option<Parameter> {
-        self.rows().iter().find(|row| row.name == name).map(|row| row.parameter)
-    }
 }
 
 const fn row(index: u16, name: &'static str, parameter: Parameter) -> Row {
@@ -169,10 +164,9 @@ mod tests {
                     assert!(row.index.is_none() || row.index != other.index, "{row:?} {other:?}");
                 }
                 assert_eq!(table.name(row.parameter), Some(row.name));
-                assert_eq!(table.parameter(row.name), Some(row.parameter));
             }
         }
         assert_eq!(ParameterTable::New.name(Parameter::Gain), None);
-        assert_eq!(ParameterTable::Old.parameter("RC_TYPE"), None);
+        assert_eq!(ParameterTable::Old.name(Parameter::RcType), None);
     }
 }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::motors::Motors;
 use super::{Device, Power};
-use crate::gimbals::gremsy::packet::{InputMode, ResetMode, user_2};
+use crate::gimbals::gremsy::packet::{InputMode, reset_of, user_2};
 use crate::sim::command::Command;
 use crate::timestamp::Timestamp;
 use crate::wire::ids::{CommandResult, command, component, message, mount_mode};
@@ -134,7 +134,7 @@ impl Device {
         match code(mode) {
             user_2::LOCK => self.set_locked(true),
             user_2::FOLLOW => self.set_locked(false),
-            user_2::RESET => match ResetMode::from_code(code(reset)) {
+            user_2::RESET => match reset_of(code(reset)) {
                 Some(mode) => self.reset(now, mode),
                 None => return CommandResult::Denied,
             },

@@ -2,8 +2,8 @@
 
 use super::Device;
 use crate::geometry::{Angle, AngularRate};
-use crate::gimbals::gremsy::packet::ResetMode;
 use crate::gimbals::gremsy::parameters::AxisFlags;
+use crate::gimbals::operation::ResetMode;
 use crate::sim::plant::{Drive, YawHold};
 use crate::timestamp::Timestamp;
 

@@ -114,7 +114,7 @@ impl Device {
 
     /// Setpoints have no effect otherwise. Firmware with the old table has no such parameter.
     pub(super) fn takes_setpoints(&self) -> bool {
-        self.value(Parameter::RcType).is_none_or(|code| RcType::from_code(code) == RcType::Sync)
+        self.value(Parameter::RcType).is_none_or(|code| RcType::from_code(code) == RcType::SYNC)
     }
 
     pub(super) fn axis_flags(&self) -> AxisFlags {

@@ -69,7 +69,7 @@ impl DeviceSettings {
             model_name: "MIO".to_owned(),
             has_usual_streams: true,
             status_target: StatusTarget::Everyone,
-            rc_type: RcType::Sync,
+            rc_type: RcType::SYNC,
             control_speed_dps: 30,
             has_inverted_pitch: false,
             is_latched_by_retract: false,

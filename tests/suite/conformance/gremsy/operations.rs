@@ -119,13 +119,13 @@ fn statement_26_a_silent_gimbal_is_told_five_times() {
 #[test]
 #[rustfmt::skip]
 fn resets_turn_it_where_they_say() {
-    for (operation,                                        v1,                                   looks) in [
-        (Operation::Reset(ResetMode::Yaw),                 packet::ResetMode::Yaw,               (-30.0, 0.0)),
-        (Operation::Reset(ResetMode::PitchAndYaw),         packet::ResetMode::PitchAndYaw,       (0.0, 0.0)),
-        (Operation::Reset(ResetMode::PitchDownUpAndYaw),   packet::ResetMode::PitchDownUpAndYaw, (-90.0, 0.0)),
-        (Operation::Reset(ResetMode::PitchDownUp),         packet::ResetMode::PitchDownUp,       (-90.0, 45.0)),
-        (Operation::Reset(ResetMode::PitchMapping),        packet::ResetMode::PitchMapping,      (-90.0, 45.0)),
-        (Operation::Mapping,                               packet::ResetMode::PitchMapping,      (-90.0, 45.0)),
+    for (operation,                                        v1,                           looks) in [
+        (Operation::Reset(ResetMode::Yaw),                 ResetMode::Yaw,               (-30.0, 0.0)),
+        (Operation::Reset(ResetMode::PitchAndYaw),         ResetMode::PitchAndYaw,       (0.0, 0.0)),
+        (Operation::Reset(ResetMode::PitchDownUpAndYaw),   ResetMode::PitchDownUpAndYaw, (-90.0, 0.0)),
+        (Operation::Reset(ResetMode::PitchDownUp),         ResetMode::PitchDownUp,       (-90.0, 45.0)),
+        (Operation::Reset(ResetMode::PitchMapping),        ResetMode::PitchMapping,      (-90.0, 45.0)),
+        (Operation::Mapping,                               ResetMode::PitchMapping,      (-90.0, 45.0)),
     ] {
         for generation in [Generation::V1, Generation::V2] {
             let (mut world, places) = controlled(generation);

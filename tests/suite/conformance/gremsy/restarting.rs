@@ -408,7 +408,7 @@ fn operations_that_move_it_wait_for_no_restart() {
         take_control(&mut world);
         restart(&mut world, Restart::Reboot);
         run(&mut world, places, SECOND);
-        let reset = Operation::Reset(gimbald::gimbals::operation::ResetMode::PitchDownUpAndYaw);
+        let reset = Operation::Reset(ResetMode::PitchDownUpAndYaw);
         let moving = [reset, Operation::SetYawMode(YawMode::Lock), Operation::Mapping, Operation::RadioControl];
         while stage(&world) != "running" {
             for operation in &moving {

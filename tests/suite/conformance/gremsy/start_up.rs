@@ -105,7 +105,7 @@ fn statement_6_golden_frames() {
         (
             3,
             "FD 20 00 00 04 01 BF 4C 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 40 40 00 00 80 40 23 79 01 9A A8 33",
-            packet::reset(GIMBAL, packet::ResetMode::PitchAndYaw),
+            packet::reset(GIMBAL, ResetMode::PitchAndYaw),
         ),
         (
             6,

@@ -299,7 +299,7 @@ fn neutral_takes_it_home() {
         assert_looks(&world, 0.0, 0.0);
         let (commands, _) = orders(&mut world, places);
         if generation == Generation::V1 {
-            assert_eq!(commands, [packet::reset(GIMBAL, packet::ResetMode::PitchAndYaw)]);
+            assert_eq!(commands, [packet::reset(GIMBAL, ResetMode::PitchAndYaw)]);
         }
     }
 }

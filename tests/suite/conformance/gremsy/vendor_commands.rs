@@ -36,11 +36,11 @@ fn each_command_does_what_the_maker_says() {
     for (number, params,                                      on_v1) in [
         (31010,  [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],         v1(packet::set_motors(GIMBAL, true))),
         (31010,  [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],         v1(packet::set_motors(GIMBAL, false))),
-        (31011,  [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 4.0],         v1(packet::reset(GIMBAL, packet::ResetMode::Yaw))),
-        (31011,  [0.0, 0.0, 0.0, 0.0, 0.0, 3.0, 4.0],         v1(packet::reset(GIMBAL, packet::ResetMode::PitchAndYaw))),
-        (31011,  [0.0, 0.0, 0.0, 0.0, 0.0, 11.0, 4.0],        v1(packet::reset(GIMBAL, packet::ResetMode::PitchDownUpAndYaw))),
-        (31011,  [0.0, 0.0, 0.0, 0.0, 0.0, 12.0, 4.0],        v1(packet::reset(GIMBAL, packet::ResetMode::PitchDownUp))),
-        (31011,  [0.0, 0.0, 0.0, 0.0, 0.0, 13.0, 4.0],        v1(packet::reset(GIMBAL, packet::ResetMode::PitchMapping))),
+        (31011,  [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 4.0],         v1(packet::reset(GIMBAL, ResetMode::Yaw))),
+        (31011,  [0.0, 0.0, 0.0, 0.0, 0.0, 3.0, 4.0],         v1(packet::reset(GIMBAL, ResetMode::PitchAndYaw))),
+        (31011,  [0.0, 0.0, 0.0, 0.0, 0.0, 11.0, 4.0],        v1(packet::reset(GIMBAL, ResetMode::PitchDownUpAndYaw))),
+        (31011,  [0.0, 0.0, 0.0, 0.0, 0.0, 12.0, 4.0],        v1(packet::reset(GIMBAL, ResetMode::PitchDownUp))),
+        (31011,  [0.0, 0.0, 0.0, 0.0, 0.0, 13.0, 4.0],        v1(packet::reset(GIMBAL, ResetMode::PitchMapping))),
         (246,    [0.0, 0.0, 1.0, 154.0, 0.0, 0.0, 0.0],       v1(packet::reboot(GIMBAL))),
         (246,    [0.0, 0.0, 2.0, 154.0, 0.0, 0.0, 0.0],       v1(packet::reboot_or_shutdown(GIMBAL, packet::RebootAction::Shutdown))),
     ] {

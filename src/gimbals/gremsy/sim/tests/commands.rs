@@ -1,8 +1,9 @@
 //! What a v1 gimbal does when it is commanded.
 
 use super::*;
-use crate::gimbals::gremsy::packet::{MessageRate, ResetMode};
+use crate::gimbals::gremsy::packet::MessageRate;
 use crate::gimbals::gremsy::parameters::RcType;
+use crate::gimbals::operation::ResetMode;
 use crate::wire::dialect::{GIMBAL_DEVICE_INFORMATION_DATA, MOUNT_STATUS_DATA, RAW_IMU_DATA};
 
 /// "205 → ACK after 5–30 ms; p6 = 1 angle / 2 rate" (gimbals 5.3), at no more than `RC_SPD_…`.
@@ -179,7 +180,7 @@ fn motors_are_off_at_once_and_on_after_three_seconds() {
 /// "RC_TYPE ≠ 7 → 205 ACKed but ignored (reproduces the gTune trap)" (gimbals 5.3).
 #[test]
 fn with_another_rc_type_it_acknowledges_and_does_not_move() {
-    let mut bench = Bench::running(Generation::V1, |settings| settings.rc_type = RcType::SbusFasst);
+    let mut bench = Bench::running(Generation::V1, |settings| settings.rc_type = RcType::from_code(1));
     bench.accept(&packet::rotate_to(GIMBAL, angles(0.0, -30.0, 40.0)));
     bench.accept(&packet::turn_at(GIMBAL, rates(0.0, 0.0, 10.0)));
     bench.run_for(3000);

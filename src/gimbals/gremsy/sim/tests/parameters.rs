@@ -1,11 +1,14 @@
 //! The parameters of the device.
 
 use super::*;
-use crate::gimbals::gremsy::parameters::{INT16, ParameterTable};
+use crate::gimbals::gremsy::parameters::ParameterTable;
 use crate::wire::dialect::{
     CharArray, MOUNT_STATUS_DATA, PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA,
     RAW_IMU_DATA,
 };
+
+/// `MAV_PARAM_TYPE_INT16`.
+const INT16: u8 = 4;
 
 pub fn set(name: &str, param_value: f32) -> PARAM_SET_DATA {
     PARAM_SET_DATA {

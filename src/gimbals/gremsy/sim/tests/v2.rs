@@ -216,7 +216,7 @@ fn mapping_looks_down_and_says_so() {
 /// Setpoints without effect: another RC type, both YAW_IN bits.
 #[test]
 fn what_has_no_effect_is_counted() {
-    let mut bench = Bench::running(Generation::V2, |settings| settings.rc_type = RcType::Herelink);
+    let mut bench = Bench::running(Generation::V2, |settings| settings.rc_type = RcType::from_code(14));
     bench.hear(MANAGER, &point(VEHICLE, -20.0, 0.0));
     bench.hear(MANAGER, &point(VEHICLE | EARTH, -20.0, 0.0));
     bench.run_for(2000);
