@@ -19,6 +19,9 @@ const COUNTS_PER_TURN: f64 = 65_536.0;
 /// No gimbal turns further; what is beyond is another unit.
 const LARGEST_DEG: f64 = 720.0;
 
+/// The length of `MOUNT_ORIENTATION` without `yaw_absolute`. An angle of exactly 0 is cut off as well, and missed for once.
+const ORIENTATION_BASE_LEN: usize = 16;
+
 /// One `RAW_IMU`, as sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RawImu {
@@ -78,8 +81,8 @@ pub struct Orientation {
     pub pitch: Angle,
     /// Against the vehicle.
     pub yaw: Angle,
-    /// Against the horizon; from North only where an autopilot tells the heading.
-    pub yaw_absolute: Angle,
+    /// Against the horizon; from North only where an autopilot tells the heading. `None` where it is not told.
+    pub yaw_absolute: Option<Angle>,
 }
 
 /// Axes that a gimbal reports the wrong way round (pitch was seen: mavros pull request 1744).
@@ -102,14 +105,18 @@ impl Orientation {
             roll: angle(message.roll, negated.roll)?,
             pitch: angle(message.pitch, negated.pitch)?,
             yaw: angle(message.yaw, negated.yaw)?,
-            yaw_absolute: angle(message.yaw_absolute, negated.yaw)?,
+            yaw_absolute: match frame.payload().len() {
+                ..=ORIENTATION_BASE_LEN => None,
+                _ => Some(angle(message.yaw_absolute, negated.yaw)?),
+            },
         })
     }
 
-    /// The attitude in the frame to which the gimbal holds its yaw: the horizon's when it is locked, else the vehicle's.
+    /// The attitude in the frame to which the gimbal holds its yaw: the horizon's when it is locked and tells that one, else
+    /// the vehicle's.
     pub fn attitude(self, locked: bool) -> GimbalAttitude {
         let Self { roll, pitch, yaw, yaw_absolute } = self;
-        if locked {
+        if let Some(yaw_absolute) = yaw_absolute.filter(|_| locked) {
             let angles = GimbalAngles { roll, pitch, yaw: yaw_absolute };
             GimbalAttitude::InEarthFrame(Attitude::from_gimbal_angles(angles))
         } else {
@@ -152,6 +159,10 @@ mod tests {
             let angles = attitude.angles();
             assert!((angles.roll.degrees() - 2.0).abs() < 1e-9 && (angles.pitch.degrees() + 30.0).abs() < 1e-9);
         }
+        // The field is an extension: one that is cut off is no North.
+        let without = read(MOUNT_ORIENTATION_DATA { yaw_absolute: 0.0, ..orientation() }).expect("numbers");
+        assert_eq!(without, Orientation { yaw_absolute: None, ..found });
+        assert_eq!(without.attitude(true), found.attitude(false));
         for broken in [f32::NAN, f32::NEG_INFINITY, -3000.0] {
             assert_eq!(read(MOUNT_ORIENTATION_DATA { pitch: broken, ..orientation() }), None);
         }
@@ -165,7 +176,7 @@ mod tests {
         let pitch = read(Negated { pitch: true, ..Negated::default() });
         assert_eq!(pitch, Orientation { pitch: -usual.pitch, ..usual });
         let yaw = read(Negated { yaw: true, ..Negated::default() });
-        assert_eq!(yaw, Orientation { yaw: -usual.yaw, yaw_absolute: -usual.yaw_absolute, ..usual });
+        assert_eq!(yaw, Orientation { yaw: -usual.yaw, yaw_absolute: usual.yaw_absolute.map(|yaw| -yaw), ..usual });
     }
 
     /// Gimbal statement 20: "MOUNT_STATUS never updates the attitude estimate of a Gremsy profile; it updates the encoder

@@ -26,7 +26,9 @@ impl GremsyDriver {
     pub(super) fn handle_orientation(&mut self, now: Timestamp, device: MavId, frame: &Frame<'_>) {
         let Some(orientation) = Orientation::read(frame, self.negated) else { return };
         self.heard.orientation = Some((now, orientation));
-        self.vehicle_turn.handle_heading(now, (orientation.yaw_absolute - orientation.yaw).wrapped());
+        if let Some(yaw_absolute) = orientation.yaw_absolute {
+            self.vehicle_turn.handle_heading(now, (yaw_absolute - orientation.yaw).wrapped());
+        }
         if self.search.decided() != Some(Generation::V1) {
             return;
         }

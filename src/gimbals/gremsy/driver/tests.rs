@@ -6,8 +6,10 @@ use crate::wire::dialect::{
     CharArray, GIMBAL_DEVICE_INFORMATION_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA, HEARTBEAT_DATA, MessageData,
     SYS_STATUS_DATA,
 };
-use crate::wire::ids::mav_state;
+use crate::wire::ids::{GimbalFlags, mav_state};
 use crate::wire::{DatagramFrames, encode_to_vec};
+
+mod telling;
 
 const GIMBAL: MavId = MavId::new(1, 154);
 
