@@ -414,10 +414,14 @@ impl GimbalManager {
         if !nudges {
             voice.needs_whole()?;
         }
-        if demand.is_stop() && self.stop_unsteerable(now) {
+        // Who only adds to it stops what it adds, and not what the primary wants.
+        if demand.is_stop() && !nudges && self.stop_unsteerable(now) {
             return Ok(());
         }
-        let capabilities = *self.steerable()?;
+        let capabilities = match self.capabilities.filter(|_| nudges && demand.is_stop()) {
+            Some(capabilities) => capabilities,
+            None => *self.steerable()?,
+        };
         let demand = match demand.kind {
             DemandKind::Manual => manual::scale(demand, &capabilities.limits, &self.settings),
             DemandKind::Streamed | DemandKind::Commanded => *demand,

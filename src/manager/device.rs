@@ -201,11 +201,6 @@ impl GimbalManager {
         }
     }
 
-    /// Whether it can be told where to look, as far as it concerns the gimbal.
-    pub(super) fn is_steerable(&self) -> bool {
-        self.capabilities.is_some() && self.readiness.is_ready()
-    }
-
     /// Whether there is a gimbal that can be steered now.
     pub(super) fn steerable(&self) -> Result<&Capabilities, Refusal> {
         match (self.state, &self.capabilities) {

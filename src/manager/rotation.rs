@@ -14,7 +14,7 @@ use crate::timestamp::Timestamp;
 /// What was told something else than its rotation for so long, and was heard meanwhile, has heard it.
 pub const STOPPED_AFTER: Duration = Duration::from_secs(1);
 
-/// A gimbal that was left turning is told so often to stop while it is not known.
+/// A gimbal that was left turning is told so often to stop while it cannot be steered.
 pub const STOP_UNKNOWN_EVERY: Duration = Duration::from_millis(500);
 
 /// What the gimbal was told to turn at.
@@ -67,8 +67,9 @@ impl GimbalManager {
 
     /// Nobody can be told what to do before it is known, but to stop.
     pub(super) fn stop_what_was_left_turning(&mut self, now: Timestamp) {
+        let is_steerable = self.steerable().is_ok();
         let Some(rotation) = self.rotation.as_mut().filter(|rotation| rotation.is_left) else { return };
-        if self.capabilities.is_some() && self.readiness.is_ready() {
+        if is_steerable {
             rotation.is_left = false;
             let turning = rotation.turning;
             self.tracking.halt(now, turning);
@@ -78,9 +79,9 @@ impl GimbalManager {
         }
     }
 
-    /// Somebody who may wants a gimbal to stop that is not known yet, or that starts again; true where it can be told.
+    /// Somebody who may wants a gimbal to stop that is not known yet, starts again or calibrates; true where it can be told.
     pub(super) fn stop_unsteerable(&mut self, now: Timestamp) -> bool {
-        let can_hear = self.is_heard && self.state != DeviceState::Lost && !self.is_steerable();
+        let can_hear = self.is_heard && self.state != DeviceState::Lost && self.steerable().is_err();
         if can_hear {
             // Nor is gone on with what may wait for it.
             self.tracking.forget();
@@ -132,6 +133,6 @@ impl GimbalManager {
 
     pub(super) fn rotation_due(&self) -> Option<Timestamp> {
         let is_left = self.rotation.is_some_and(|rotation| rotation.is_left);
-        self.stop_unknown.filter(|_| is_left && self.is_heard && !self.is_steerable())
+        self.stop_unknown.filter(|_| is_left && self.is_heard)
     }
 }

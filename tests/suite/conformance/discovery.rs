@@ -298,6 +298,46 @@ fn item_36_a_calibrating_gimbal_is_not_steered() {
     assert_eq!(world.result_of(places.ground, GCS, &down()), Some(ACCEPTED));
 }
 
+/// "A gimbal never keeps turning after its operator is gone", nor when the operator says so: to stop is no way of steering. A rate
+/// that runs when the gimbal begins to calibrate ends at the word of who asked for it, and so does a place or an angle;
+/// none of it comes back when the calibration is over.
+#[test]
+fn item_36_a_calibrating_gimbal_is_stopped() {
+    let stop = || {
+        let MavMessage::COMMAND_LONG(command) = pitchyaw(NAN, NAN, 0.0, 0.0, 44.0) else { unreachable!() };
+        MavMessage::COMMAND_LONG(COMMAND_LONG_DATA { param7: 0.0, ..command })
+    };
+    let told = |world: &mut World, places: Places| -> Vec<[f32; 2]> {
+        let told: Vec<GIMBAL_DEVICE_SET_ATTITUDE_DATA> = world.take_messages(places.gimbal);
+        assert!(told.iter().all(|told| told.q.iter().all(|q| q.is_nan())), "{told:?}");
+        told.iter().map(|told| [told.angular_velocity_y, told.angular_velocity_z]).collect()
+    };
+    for demand in [pitchyaw(NAN, NAN, 0.0, 10.0, 44.0), down()] {
+        let (mut world, places) = with_device();
+        assert_eq!(world.result_of(places.ground, GCS, &demand), Some(ACCEPTED));
+        world.run_for(SECOND / 4);
+        report_failure(&mut world, places, 256);
+        assert_eq!(world.result_of(places.ground, GCS, &demand), Some(TEMPORARILY_REJECTED));
+        world.forget();
+
+        assert_eq!(world.result_of(places.ground, GCS, &stop()), Some(ACCEPTED));
+        assert_eq!(told(&mut world, places), [[0.0, 0.0]], "at once");
+        for _ in 0..8 {
+            world.run_for(SECOND / 4);
+            report_failure(&mut world, places, 256);
+        }
+        let zeros = told(&mut world, places);
+        assert!(zeros.len() >= 3 && zeros.iter().all(|rates| *rates == [0.0, 0.0]), "{zeros:?}");
+        assert_eq!(world.snapshot().gimbals[0].setpoint, None);
+
+        // It rests for a second by its rates, and is kept where it then looks.
+        report_failure(&mut world, places, 0);
+        world.run_for(SECOND / 2);
+        let zeros = told(&mut world, places);
+        assert!(!zeros.is_empty() && zeros.iter().all(|rates| *rates == [0.0, 0.0]), "{zeros:?}");
+    }
+}
+
 /// "When failure_flags has any of 8/16/32/64/128, HEARTBEAT turns CRITICAL within 1.1 s."
 #[test]
 fn item_37_a_hard_failure_shows_in_the_heartbeat() {

@@ -95,6 +95,25 @@ fn the_primarys_next_setpoint_takes_a_nudge_back() {
     assert_eq!((setpoint.nudge_pitch_deg, setpoint.nudge_yaw_deg), (0.0, 0.0));
 }
 
+/// Also while the gimbal calibrates, when nobody steers it: the secondary stops what it adds, and not what the primary wants.
+#[test]
+fn a_secondary_that_stops_while_the_gimbal_calibrates_stops_only_itself() {
+    let (mut world, places) = shared();
+    assert_eq!(world.result_of(places.autopilot, COMPANION, &pitchyaw(NAN, NAN, 0.0, 1.0, 44.0)), Some(ACCEPTED));
+    world.run_for(SECOND);
+    let status = device_status(world.now, 44, -30.0, 11.0);
+    let status = GIMBAL_DEVICE_ATTITUDE_STATUS_DATA { failure_flags: 256, ..status };
+    world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status));
+
+    assert_eq!(world.result_of(places.autopilot, COMPANION, &pitchyaw(NAN, NAN, 0.0, 1.0, 44.0)), Some(1));
+    assert_eq!(world.result_of(places.autopilot, COMPANION, &pitchyaw(NAN, NAN, 0.0, 0.0, 44.0)), Some(ACCEPTED));
+    world.run_for(SECOND);
+
+    let setpoint = world.snapshot().gimbals[0].setpoint.clone().expect("there is one");
+    assert_eq!((setpoint.source, setpoint.mode.as_str()), (Some(GCS.to_string()), "angle"));
+    assert_near(setpoint.nudge_yaw_deg, 1.0, 0.06);
+}
+
 /// A rate of the primary is no absolute setpoint: it turns the camera on from where it looks, and nothing jumps.
 #[test]
 fn a_rate_of_the_primary_goes_on_from_the_nudge() {
