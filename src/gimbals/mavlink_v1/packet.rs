@@ -120,6 +120,12 @@ mod tests {
             (MountControl::Angles(angles), Signs::REVERSED, [45.0, 5.0, -30.0, 2.0]),
             (MountControl::Angles(angles), only_pitch, [45.0, 5.0, 30.0, 2.0]),
             (MountControl::Angles(angles), only_roll, [-45.0, -5.0, 30.0, 2.0]),
+            // Whichever way round it was said.
+            (
+                MountControl::Angles(GimbalAngles { yaw: degrees(190.0), ..angles }),
+                Signs::NORMAL,
+                [-45.0, 5.0, -170.0, 2.0],
+            ),
             (MountControl::Neutral, Signs::REVERSED, [0.0, 0.0, 0.0, 1.0]),
             (MountControl::Retract, Signs::NORMAL, [0.0, 0.0, 0.0, 0.0]),
             (MountControl::RadioControl, Signs::REVERSED, [0.0, 0.0, 0.0, 3.0]),

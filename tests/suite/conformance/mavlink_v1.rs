@@ -201,6 +201,13 @@ fn statement_37_a_rate_becomes_angles_that_move_and_end() {
     let down = told(&mut world, places);
     assert!(down.iter().all(|told| told[0] >= -90.0));
     assert_near(down[down.len() - 1], [-90.0, 0.0, 0.0, 2.0]);
+
+    // And back from there at once, whatever it was asked for beyond.
+    let up = command_long(MANAGER, 1000, &[NAN, NAN, 20.0, 0.0, 44.0, 0.0, 1.0]);
+    assert_eq!(world.result_of(places.ground, GCS, &up), Some(ACCEPTED));
+    keep(&mut world, SECOND / 2);
+    let up = told(&mut world, places);
+    assert!((-81.0..=-79.0).contains(&up[up.len() - 1][0]), "{up:?}");
 }
 
 /// Gimbal statement 48: "… the daemon's client code supplies both angles": a client that names one axis has the other

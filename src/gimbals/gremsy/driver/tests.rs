@@ -1,6 +1,7 @@
 use super::*;
 use crate::geometry::{AngularRate, YawFrame};
 use crate::gimbals::gremsy::packet;
+use crate::gimbals::operation::Restart;
 use crate::gimbals::setpoint::{RadioControl, Stabilised};
 use crate::wire::dialect::{
     CharArray, GIMBAL_DEVICE_INFORMATION_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA, HEARTBEAT_DATA, MessageData,
@@ -239,4 +240,30 @@ fn a_fault_of_the_firmware_ends_with_it() {
     run(&mut driver, 0, 1_000);
     assert!(with_firmware(&mut driver, 1_000, 0x0004_0807));
     assert!(!with_firmware(&mut driver, 21_000, 0x0009_0807));
+}
+
+/// One that was told to start again is silent for ten seconds and waited for, but not for ever.
+#[test]
+fn one_that_does_not_come_back_is_lost_after_twenty_seconds() {
+    let mut driver =
+        GremsyDriver::new(GremsySettings { generation: Some(Generation::V1), ..GremsySettings::default() });
+    driver.adopt(Timestamp::ZERO, GIMBAL);
+    run(&mut driver, 0, 12_000);
+    let now = Timestamp::from_secs(12);
+    driver.handle_operation(now, OperationId(1), Operation::Restart(Restart::Reboot));
+    let accepted = CommandOutcome::Answered(CommandResult::Accepted as u8);
+    driver.handle_command_outcome(now, &packet::reboot(GIMBAL), accepted);
+
+    let mut lost = Vec::new();
+    for millis in 12_000..40_000 {
+        let now = Timestamp::from_millis(millis);
+        if driver.poll_timeout().is_some_and(|due| due <= now) {
+            driver.handle_timeout(now);
+        }
+        while let Some(output) = driver.poll_output() {
+            lost.extend((output == DriverOutput::Report(Report::Lost)).then_some(millis));
+        }
+    }
+
+    assert_eq!(lost, [32_000]);
 }

@@ -240,6 +240,15 @@ fn statement_47_without_reports_the_attitude_is_a_slow_guess() {
     assert_near(line.reported(), (-30.0, 0.0));
     line.run_for(2 * SECOND);
     assert_near(line.reported(), (-60.0, 0.0));
+
+    // One that tells where it looks after all is believed at once, and not marked any more.
+    let orientation =
+        MOUNT_ORIENTATION_DATA { time_boot_ms: 9_000, roll: 0.0, pitch: 10.0, yaw: 20.0, yaw_absolute: 20.0 };
+    let bytes = encode_to_vec(GIMBAL, 0, &orientation);
+    line.driver.handle_received(line.now, &DatagramFrames::new(&bytes).next_frame().expect("a frame"));
+    line.settle();
+    assert!(!line.is_open_loop());
+    assert_near(line.reported(), (10.0, 20.0));
 }
 
 /// D9: a gimbal that was lost is not moved when it comes back, until somebody asks.
