@@ -49,6 +49,7 @@ use crate::vehicle::Vehicle;
 use crate::wire::{FrameBuffer, MavId};
 use announcements::Announcements;
 use asked::UnderWay;
+use carrying_out::NotedTurning;
 use channels::Channels;
 use conflicts::Conflicts;
 use ending::Stopping;
@@ -117,8 +118,7 @@ pub enum Output<'a> {
     Transmit { channels: ChannelSet, bytes: &'a [u8] },
     /// Keep the adopted system id for the next start.
     StoreSystemId(u8),
-    /// Keep the names of the gimbals that are told to turn, one to a line, for a start after we were killed; empty when
-    /// none is.
+    /// Keep which gimbals are told to turn, one to a line, for a start after we were killed; empty when none is.
     StoreTurning(&'a str),
     /// What became of something asked.
     Answered { id: OperationId, answer: &'a Answer },
@@ -157,8 +157,8 @@ pub struct Bridge {
     timers: TimerTable<Timer>,
     shutting_down: bool,
     stopping: Option<Stopping>,
-    /// By place in the roster, which gimbals may be turning as they were told; kept outside when it changes.
-    turning: u64,
+    /// Kept outside when it changes.
+    turning: NotedTurning,
 }
 
 /// A system that has an autopilot.
@@ -206,7 +206,7 @@ impl Bridge {
             timers: TimerTable::default(),
             shutting_down: false,
             stopping: None,
-            turning: 0,
+            turning: NotedTurning::default(),
             identity,
             settings,
         };

@@ -1,17 +1,27 @@
 //! Does what drivers and managers want done: frames of our own, orders to a gimbal, answers.
 
-use super::roster::GimbalOutput;
+use super::roster::{GimbalOutput, LeftTurning};
 use super::settings::Role;
 use super::transactions::{Asker, Order};
 use super::{Bridge, heartbeat, surroundings};
 use crate::channel::ChannelSet;
 use crate::gimbals::DriverOutput;
 use crate::gimbals::report::Report;
+use crate::gimbals::settings::Family;
 use crate::manager::ManagerOutput;
 use crate::manager::asked::NotDone;
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 use crate::wire::dialect::MavMessage;
+
+/// Which gimbals may be turning, as it is kept outside.
+#[derive(Debug, Default)]
+pub(super) struct NotedTurning {
+    /// By place in the roster, with their devices, and whose words stop them.
+    gimbals: Vec<(usize, Option<MavId>, Option<Family>)>,
+    /// The revision of those that are waited for.
+    awaited: u32,
+}
 
 impl Bridge {
     /// Does what the gimbals' drivers and managers want done, and what is to be done about our own commands.
@@ -25,17 +35,20 @@ impl Bridge {
         self.note_turning();
     }
 
-    /// Whoever is killed while a gimbal turns finds out at the next start that it is to be stopped.
+    /// Whoever is killed while a gimbal turns finds out at the next start that it is to be stopped, and so are those that are
+    /// waited for since the last one.
     fn note_turning(&mut self) {
-        let turning = self.roster.iter().take(64).enumerate().filter(|(_, gimbal)| gimbal.may_be_turning());
-        let turning = turning.fold(0, |set, (at, _)| set | 1 << at);
-        if turning == self.turning {
+        let turning = self.roster.iter().enumerate().filter(|(_, gimbal)| gimbal.may_be_turning());
+        let awaited = self.roster.awaited();
+        let noted = turning.clone().map(|(at, gimbal)| (at, gimbal.adopted, gimbal.driver.stops_as()));
+        if self.turning.awaited == awaited.revision() && self.turning.gimbals.iter().copied().eq(noted.clone()) {
             return;
         }
-        self.turning = turning;
-        let named = self.roster.iter().take(64).enumerate().filter(|(at, _)| turning & 1 << at != 0);
-        let names: String = named.map(|(_, gimbal)| format!("{}\n", gimbal.turning_line())).collect();
-        self.outbox.push_turning(names);
+        let gimbals = noted.collect();
+        let lines = turning.map(|(_, gimbal)| LeftTurning::of(gimbal)).chain(awaited.iter().cloned());
+        let lines: String = lines.map(|left| format!("{left}\n")).collect();
+        self.turning = NotedTurning { gimbals, awaited: awaited.revision() };
+        self.outbox.push_turning(lines);
     }
 
     pub(super) fn carry_out_for_gimbals(&mut self, now: Timestamp) {

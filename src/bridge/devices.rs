@@ -119,6 +119,7 @@ impl Bridge {
 
     /// Once a second: whether a device that was lost has another component id now.
     pub(super) fn look_for_renamed(&mut self, now: Timestamp) {
+        self.roster.stop_successors(now);
         for Renamed { former, device } in self.roster.give_up_renamed(now) {
             self.conflicts.note(now, Conflict::DeviceRenamed { former, device });
         }

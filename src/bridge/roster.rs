@@ -3,11 +3,13 @@
 //! One component per gimbal: device 154 has manager 191, 171 has 192, 172 has 193, 173 has 194; other gimbals take the
 //! free ones in the order of the configuration.
 //!
-//! Which device belongs to which of them is decided in [`adoption`].
+//! Which device belongs to which of them is decided in [`adoption`], who is to be stopped in [`left_turning`].
 
 mod adoption;
+mod left_turning;
 
 pub use adoption::{Hearing, NotAdopted, Place, Renamed};
+pub use left_turning::LeftTurning;
 
 use super::LinkIndex;
 use super::settings::Settings;
@@ -21,9 +23,7 @@ use crate::manager::{GimbalManager, ManagerOutput};
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 use crate::wire::ids::{component, mav_type};
-
-/// Stands between the name of a gimbal that was left turning and the family whose words stop it.
-const TURNS_AS: char = '\t';
+use left_turning::Awaited;
 
 /// A gimbal with its manager and driver.
 #[derive(Debug)]
@@ -43,6 +43,8 @@ pub struct Gimbal {
     elsewhere: Option<LinkIndex>,
     /// When it turned out that two speak under its id.
     has_twin: Option<Timestamp>,
+    /// The device that may be this one, and was turning.
+    stopped_for: Option<MavId>,
     /// The manager's component id.
     pub component: u8,
     /// It has an entry in the configuration, and is missed when it is not there.
@@ -69,6 +71,7 @@ impl Gimbal {
             heard: Timestamp::ZERO,
             elsewhere: None,
             has_twin: None,
+            stopped_for: None,
             component,
             configured,
         }
@@ -107,15 +110,6 @@ impl Gimbal {
         self.component == component::ONBOARD_COMPUTER || self.manager.device().is_some()
     }
 
-    /// What is kept for the next run of one that turns: its name, and whose words stop it where only we know.
-    pub fn turning_line(&self) -> String {
-        let name = &self.manager.settings().name;
-        match self.driver.stops_as() {
-            Some(family) => format!("{name}{TURNS_AS}{}", family.name()),
-            None => name.clone(),
-        }
-    }
-
     /// Whether it may be turning as it was told.
     pub fn may_be_turning(&self) -> bool {
         self.manager.may_be_turning() || self.driver.may_be_turning()
@@ -145,8 +139,8 @@ pub enum GimbalOutput {
 pub struct Roster {
     gimbals: Vec<Gimbal>,
     rules: ControlSettings,
-    /// Gimbals that an earlier run left turning, and that were not there since.
-    left_turning: Vec<String>,
+    /// Gimbals that were left turning, and that were not there since.
+    left_turning: Awaited,
     /// The channels that are open, for the manager of a gimbal that is found later.
     open: ChannelSet,
     /// Devices that are not adopted yet, and when each was first heard.
@@ -160,7 +154,7 @@ impl Roster {
         let mut roster = Self {
             gimbals: Vec::new(),
             rules: settings.control.clone(),
-            left_turning: settings.left_turning.clone(),
+            left_turning: Awaited::read(&settings.left_turning),
             open: ChannelSet::EMPTY,
             waiting: Vec::new(),
             self_managed: Vec::new(),
@@ -186,13 +180,11 @@ impl Roster {
             roster.gimbals.push(Gimbal::new(gimbal.clone(), &settings.control, component, true, number));
         }
         roster.ensure_first_manager();
-        for at in 0..roster.gimbals.len() {
-            roster.stop_if_left_turning(at);
-        }
+        roster.stop_entries_left_turning();
         roster
     }
 
-    pub fn iter(&self) -> impl Iterator<Item = &Gimbal> {
+    pub fn iter(&self) -> impl Iterator<Item = &Gimbal> + Clone {
         self.gimbals.iter()
     }
 
@@ -278,7 +270,10 @@ impl Roster {
         let (at, component) = match self.free_manager(device) {
             Some(component) => (self.gimbals.len(), component),
             None => {
-                let at = self.gimbals.iter().position(given_up).ok_or(NotAdopted::NoManagerLeft)?;
+                let rests = |gimbal: &Gimbal| given_up(gimbal) && !gimbal.may_be_turning();
+                let at = self.gimbals.iter().position(rests).or_else(|| self.gimbals.iter().position(given_up));
+                let at = at.ok_or(NotAdopted::NoManagerLeft)?;
+                self.await_if_turning(at);
                 (at, self.gimbals.remove(at).component)
             }
         };
@@ -288,23 +283,7 @@ impl Roster {
             gimbal.manager.open_channel(now, channel);
         }
         self.gimbals.insert(at, gimbal);
-        self.stop_if_left_turning(at);
         Ok(at)
-    }
-
-    fn stop_if_left_turning(&mut self, at: usize) {
-        let Gimbal { manager, driver, .. } = &mut self.gimbals[at];
-        let name = manager.settings().name.as_str();
-        let read =
-            |line: &str| line.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with(TURNS_AS));
-        if let Some(left) = self.left_turning.iter().position(|line| read(line)) {
-            let line = self.left_turning.swap_remove(left);
-            let family = line.strip_prefix(name).and_then(|rest| rest.strip_prefix(TURNS_AS));
-            if family == Some(Family::Gremsy.name()) {
-                driver.stop_as(Family::Gremsy);
-            }
-            manager.stop_when_heard();
-        }
     }
 
     /// A name that no gimbal has: by the component, with the system where that is not the vehicle's.

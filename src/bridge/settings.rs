@@ -12,8 +12,8 @@ pub struct Settings {
     pub system_id: SystemId,
     /// The system id adopted in an earlier run, used at once until the autopilot says otherwise.
     pub stored_system_id: Option<u8>,
-    /// The gimbals that an earlier run had told to turn and not to stop, by name: it had no time for that. Each is told to
-    /// stop when it is heard. Behind a tab stands the family whose words stop it, where that was found out.
+    /// The gimbals that an earlier run had told to turn and not to stop, a line of each as it was to be kept: it had no time
+    /// for that. Each is told to stop when it is heard.
     pub left_turning: Vec<String>,
     pub links: Vec<LinkSettings>,
     pub gimbals: Vec<GimbalSettings>,

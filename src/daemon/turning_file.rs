@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 const NAME: &str = "turning";
 
-/// A file of names in the runtime directory, which is in memory and outlives a restart; nothing is kept without that
+/// A file in the runtime directory, a line of each gimbal, which is in memory and outlives a restart; nothing is kept without that
 /// directory. It is written when a rotation starts or ends, on the way to the gimbal, which costs a few dozen microseconds.
 #[derive(Debug)]
 pub struct TurningFile {
@@ -18,11 +18,11 @@ impl TurningFile {
         Self { directory }
     }
 
-    /// The gimbals that an earlier run left turning.
+    /// The lines of the gimbals that an earlier run left turning.
     pub fn read(&self) -> Vec<String> {
         let Some(path) = self.path() else { return Vec::new() };
         match fs::read_to_string(&path) {
-            Ok(text) => text.lines().filter(|name| !name.is_empty()).map(str::to_owned).collect(),
+            Ok(text) => text.lines().filter(|line| !line.is_empty()).map(str::to_owned).collect(),
             Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
             Err(error) => {
                 tracing::warn!(path = %path.display(), %error, "whether a gimbal was left turning cannot be read");
@@ -31,13 +31,13 @@ impl TurningFile {
         }
     }
 
-    /// Replaces what was kept; `names` stand one to a line.
-    pub fn store(&self, names: &str) {
+    /// Replaces what was kept.
+    pub fn store(&self, lines: &str) {
         let Some(path) = self.path() else { return };
-        let stored = if names.is_empty() { fs::remove_file(&path) } else { fs::write(&path, names) };
+        let stored = if lines.is_empty() { fs::remove_file(&path) } else { fs::write(&path, lines) };
         match stored {
             Ok(()) => {}
-            Err(error) if names.is_empty() && error.kind() == io::ErrorKind::NotFound => {}
+            Err(error) if lines.is_empty() && error.kind() == io::ErrorKind::NotFound => {}
             Err(error) => tracing::error!(path = %path.display(), %error, "that a gimbal turns cannot be kept"),
         }
     }
@@ -56,8 +56,8 @@ mod tests {
         let directory = tempfile::tempdir().expect("a directory");
         let file = TurningFile::new(Some(directory.path().to_owned()));
         assert_eq!(file.read(), Vec::<String>::new());
-        file.store("camera\ngimbal-171\n");
-        assert_eq!(TurningFile::new(Some(directory.path().to_owned())).read(), ["camera", "gimbal-171"]);
+        file.store("camera\t1/154\ngimbal-171\n");
+        assert_eq!(TurningFile::new(Some(directory.path().to_owned())).read(), ["camera\t1/154", "gimbal-171"]);
         file.store("");
         file.store("");
         assert_eq!(file.read(), Vec::<String>::new());

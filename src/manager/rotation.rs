@@ -38,6 +38,14 @@ impl GimbalManager {
         self.rotation = Some(Rotation { turning: Turning::STOPPED, stopped: None, is_left: true });
     }
 
+    /// It may be one that was told to turn under another id. Whoever steers it tells it something else anyway.
+    pub fn stop_unless_steered(&mut self, now: Timestamp) {
+        if self.tracking.mode().is_none() && self.rotation.is_none() {
+            self.stop_when_heard();
+            self.stop_what_was_left_turning(now);
+        }
+    }
+
     /// The first sign of its device: more may never come.
     pub fn handle_sign(&mut self, now: Timestamp) {
         self.is_heard = true;

@@ -201,7 +201,7 @@ fn assert_same(found: (f64, f64), wanted: (f64, f64), within: f64) {
 #[test]
 fn a_gimbal_that_was_left_turning_is_stopped_by_the_next_life() {
     let mut flight = Flight::after_a_kill(Doing::Turning);
-    assert_eq!(flight.world.stored_turning, ["gimbal-154"]);
+    assert_eq!(flight.world.stored_turning, ["gimbal-154\t7/154"]);
     let left_turning = flight.world.stored_turning.clone();
 
     flight.world.start(Settings { left_turning, ..settings(Some(SYSTEM)) });
@@ -214,7 +214,7 @@ fn a_gimbal_that_was_left_turning_is_stopped_by_the_next_life() {
     let rates: Vec<_> = setpoints.iter().map(|told| [told.angular_velocity_y, told.angular_velocity_z]).collect();
     assert_eq!(rates, [[0.0, 0.0]], "as soon as it is known");
     assert!(setpoints[0].q.iter().all(|q| q.is_nan()), "and to go nowhere");
-    assert_eq!(flight.world.stored_turning, ["gimbal-154"]);
+    assert_eq!(flight.world.stored_turning, ["gimbal-154\t7/154"]);
     let before = flight.pose_deg();
     flight.beat_for(5);
     assert_eq!(flight.world.stored_turning, Vec::<String>::new());
@@ -230,9 +230,9 @@ fn who_turns_is_kept_from_the_first_rate_to_the_last_zero() {
     flight.world.start(settings(Some(SYSTEM)));
     flight.beat_for(3);
     assert_eq!(flight.demand(&[NAN, NAN, 0.0, 20.0, 44.0]), Some(ACCEPTED));
-    assert_eq!(flight.world.stored_turning, ["gimbal-154"]);
+    assert_eq!(flight.world.stored_turning, ["gimbal-154\t7/154"]);
     assert_eq!(flight.demand(&[NAN, NAN, 0.0, 0.0, 44.0]), Some(ACCEPTED));
-    assert_eq!(flight.world.stored_turning, ["gimbal-154"], "the first zero may be lost");
+    assert_eq!(flight.world.stored_turning, ["gimbal-154\t7/154"], "the first zero may be lost");
     flight.beat_for(2);
     assert_eq!(flight.world.stored_turning, Vec::<String>::new());
 }

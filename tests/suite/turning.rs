@@ -2,6 +2,8 @@
 //! while it turns, it stands soon after it can be reached.
 
 mod away;
+mod killed;
+mod renamed;
 
 use std::time::Duration;
 
@@ -12,6 +14,7 @@ use gimbald::gimbals::mavlink_v2::sim as v2;
 use gimbald::sim::plant::PlantSettings;
 use gimbald::sim::vehicle::{Vehicle, VehicleSettings};
 use gimbald::timestamp::Timestamp;
+use gimbald::wire::MavId;
 
 use crate::support::cable::{Cable, Cabled};
 use crate::support::hub::Watched;
@@ -110,7 +113,11 @@ impl Flight {
 
     /// It turns, and the ground station asks for that still.
     fn turning(kind: Kind) -> Self {
-        let mut flight = Self::begin(kind);
+        Self::turning_with(kind, three_links())
+    }
+
+    fn turning_with(kind: Kind, settings: Settings) -> Self {
+        let mut flight = Self::begin_with(kind, settings);
         flight.turn_for(2 * SECOND);
         let before = flight.gimbal.yaw_deg();
         flight.turn_for(SECOND);

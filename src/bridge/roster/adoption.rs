@@ -128,13 +128,19 @@ impl Roster {
             None => self.make_place(now, device, ours)?,
         };
         self.waiting.retain(|(waiting, _)| *waiting != device);
+        // It is another one, perhaps, unless it has only taken the vehicle's system id.
+        let came_home = |known: MavId| known.component == device.component && device.system == ours;
+        if self.gimbals[at].adopted.is_some_and(|known| !came_home(known)) {
+            self.await_if_turning(at);
+        }
         let gimbal = &mut self.gimbals[at];
         gimbal.driver.adopt(now, device);
         gimbal.adopted = Some(device);
         gimbal.channel = Some(place.channel);
         (gimbal.link, gimbal.adopted_at, gimbal.heard) = (place.link, now, now);
-        (gimbal.elsewhere, gimbal.has_twin) = (None, None);
-        Ok(gimbal)
+        (gimbal.elsewhere, gimbal.has_twin, gimbal.stopped_for) = (None, None, None);
+        self.stop_if_left_turning(at, device);
+        Ok(&mut self.gimbals[at])
     }
 
     /// Whether `id` manages a gimbal of its own, which is none of ours.
@@ -159,7 +165,8 @@ impl Roster {
     }
 
     /// Devices that were lost and speak under another component id now: their former place is given up, but for those
-    /// with an entry that names the component, which are told of.
+    /// with an entry that names the component, which are told of. What they were told to turn was stopped
+    /// ([`stop_successors`](Self::stop_successors)).
     pub fn give_up_renamed(&mut self, now: Timestamp) -> Vec<Renamed> {
         let mut told = Vec::new();
         for at in 0..self.gimbals.len() {

@@ -264,7 +264,7 @@ fn a_gremsy_that_was_left_turning_is_stopped_before_it_is_known_again() {
     run(&mut world, places, 30 * SECOND);
     assert_eq!(turn(&mut world, places, 5.0), Some(ACCEPTED));
     run(&mut world, places, SECOND);
-    assert_eq!(world.stored_turning, ["gimbal-154\tgremsy"]);
+    assert_eq!(world.stored_turning, ["gimbal-154\t1/154\tgremsy"]);
 
     is_mute.set(true);
     for life in 0..2 {
@@ -272,7 +272,7 @@ fn a_gremsy_that_was_left_turning_is_stopped_before_it_is_known_again() {
         world.run_for(SECOND / 2);
         let before = yaw();
         let left_turning = world.stored_turning.clone();
-        assert_eq!(left_turning, ["gimbal-154\tgremsy"], "{life}");
+        assert_eq!(left_turning, ["gimbal-154\t1/154\tgremsy"], "{life}");
         world.start(Settings { left_turning, ..three_links() });
         run(&mut world, places, SECOND * 13 / 10);
         // It beats once a second.
@@ -366,7 +366,7 @@ fn a_change_of_family_stops_what_turns_first() {
     let rates: Vec<_> = told.iter().map(|told| [told.angular_velocity_y, told.angular_velocity_z]).collect();
     assert_eq!(rates, [[0.0, 0.0]]);
     assert_eq!(turn(&mut world, places, 10.0), Some(TEMPORARILY_REJECTED));
-    assert_eq!(world.stored_turning, ["gimbal-154"], "until it is known to have stopped");
+    assert_eq!(world.stored_turning, ["gimbal-154\t1/154\tgremsy"], "until it is known to have stopped");
 }
 
 /// One that was taken for a Gremsy by a parameter, and says that somebody else made it, is none.

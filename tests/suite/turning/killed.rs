@@ -1,0 +1,114 @@
+//! The daemon is killed while it turns, and what it left behind is read by the next.
+
+use gimbald::gimbals::settings::GimbalSettings;
+
+use super::*;
+
+/// `camera` has an entry that names no device; the other one, on a channel of its own on the same link, has none.
+struct Two {
+    flight: Flight,
+    other: Gimbal,
+    other_cable: Cable,
+    settings: Settings,
+}
+
+impl Two {
+    /// Both can be steered.
+    fn begin(kind: Kind) -> Self {
+        let settings = Settings { gimbals: vec![GimbalSettings::found("camera".to_owned())], ..three_links() };
+        let mut flight = Flight::begin_with(kind, settings.clone());
+        let place = flight.world.open(1);
+        let (other, other_cable) = Gimbal::install(&mut flight.world, place, kind, 171);
+        flight.run_for(22 * SECOND);
+        Self { flight, other, other_cable, settings }
+    }
+
+    fn turn(&mut self, manager: u8) {
+        let command = command_long(MavId::new(1, manager), 1000, &[NAN, NAN, 0.0, 5.0, 44.0, 0.0, 0.0]);
+        let (places, world) = (self.flight.places, &mut self.flight.world);
+        assert_eq!(world.result_of(places.ground, GCS, &command), Some(ACCEPTED));
+    }
+
+    /// The daemon is killed, and started again half a second later.
+    fn kill_and_start(&mut self) {
+        self.flight.world.kill();
+        self.flight.run_for(SECOND / 2);
+        let left_turning = self.flight.world.stored_turning.clone();
+        self.flight.world.start(Settings { left_turning, ..self.settings.clone() });
+    }
+}
+
+/// "The next start tells them to stop at the first sign of them": the device that turned, whatever it is called now; who
+/// has its name now is told nothing (D9: "Nothing is sent before the first accepted demand").
+#[test]
+fn the_device_that_turned_is_stopped_whatever_it_is_called_now() {
+    for kind in KINDS {
+        let mut two = Two::begin(kind);
+        two.turn(191);
+        two.flight.run_for(2 * SECOND);
+        assert_eq!(two.flight.world.stored_turning.len(), 1, "{kind:?}");
+        two.flight.cable.cut();
+        two.kill_and_start();
+        two.flight.run_for(3 * SECOND);
+        two.flight.cable.mend();
+        two.flight.run_for(8 * SECOND);
+
+        let gimbals = two.flight.world.snapshot().gimbals;
+        let named = |name: &str| gimbals.iter().find(|gimbal| gimbal.name == name).cloned().expect("it is there");
+        assert_eq!(named("camera").device.as_deref(), Some("1/171"), "{kind:?}");
+        assert_eq!(named("camera").setpoint, None, "{kind:?}: nobody has asked for anything");
+        two.flight.assert_rests(&format!("{kind:?}"));
+        two.flight.run_for(10 * SECOND);
+        assert_eq!(two.flight.world.stored_turning, Vec::<String>::new(), "{kind:?}");
+    }
+}
+
+/// "Kept until they have been told to stop": also one that was not heard in the life between, however that ended.
+#[test]
+fn who_is_waited_for_is_kept_for_the_next_start_too() {
+    for kind in KINDS {
+        for by_signal in [false, true] {
+            let what = format!("{kind:?}, by signal {by_signal}");
+            let mut two = Two::begin(kind);
+            two.turn(191);
+            two.turn(192);
+            two.flight.run_for(2 * SECOND);
+            assert_eq!(two.flight.world.stored_turning.len(), 2, "{what}");
+            two.other_cable.cut();
+            two.kill_and_start();
+            two.flight.run_for(20 * SECOND);
+            two.flight.assert_rests(&what);
+            let family = if kind == Kind::V2Device { "" } else { "\tgremsy" };
+            assert_eq!(two.flight.world.stored_turning, [format!("gimbal-171\t1/171{family}")], "{what}");
+
+            if by_signal {
+                two.flight.world.input(gimbald::bridge::Input::Shutdown);
+                two.flight.world.run_for(SECOND);
+            }
+            two.kill_and_start();
+            two.other_cable.mend();
+            two.flight.run_for(8 * SECOND);
+            let other = two.other.clone();
+            super::assert_rests(&mut two.flight, |_| other.yaw_deg(), &what);
+            two.flight.run_for(10 * SECOND);
+            assert_eq!(two.flight.world.stored_turning, Vec::<String>::new(), "{what}");
+        }
+    }
+}
+
+/// A file of an older version has names alone, and what is no such line does no harm.
+#[test]
+fn names_alone_are_read_as_well() {
+    for kind in KINDS {
+        for lines in [&["gimbal-154"][..], &["", "\t", "\u{1}\t1/1\t", "gimbal-154\tof old"]] {
+            let mut flight = Flight::begin(kind);
+            assert_eq!(flight.rate_command(5.0), Some(ACCEPTED));
+            flight.run_for(2 * SECOND);
+            flight.world.kill();
+            let left_turning = lines.iter().map(|line| (*line).to_owned()).collect();
+            flight.world.start(Settings { left_turning, ..three_links() });
+            flight.run_for(8 * SECOND);
+            flight.assert_rests(&format!("{kind:?} {lines:?}"));
+        }
+    }
+}
