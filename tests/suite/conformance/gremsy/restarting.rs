@@ -200,6 +200,7 @@ fn assert_refused_until_ready(world: &mut World, places: Places, mut refuse: imp
     took
 }
 
+/// Gimbal statement 32: "Reboot command followed by 10 s silence does not trigger a permanent loss; driver re-runs start-up".
 /// A restart that we asked for, in the middle of a place or a rotation of whoever has control.
 #[test]
 fn while_it_starts_again_every_demand_is_refused_and_nothing_goes_on_afterwards() {
@@ -296,7 +297,7 @@ fn while_it_starts_again_it_can_be_stopped_let_go_and_looked_at() {
     }
 }
 
-/// It restarts and nobody here asked for it: over a short cut of its power, and with ten seconds of silence, for which it
+/// Gimbal statement 32, where nobody here asked for the restart: over a short cut of its power, and with ten seconds of silence, for which it
 /// counts as lost.
 #[test]
 fn a_restart_that_nobody_asked_for_is_none_that_anything_waits_for() {
@@ -361,7 +362,7 @@ fn with_the_family_found_out_it_is_the_same() {
     }
 }
 
-/// It starts again and its answer is lost, or two of three commands are: its silence tells.
+/// Gimbal statement 32, where it starts again and its answer is lost, or two of three commands are: its silence tells.
 #[test]
 fn a_lost_answer_makes_no_difference() {
     for generation in [Generation::V1, Generation::V2] {
@@ -379,7 +380,7 @@ fn a_lost_answer_makes_no_difference() {
     }
 }
 
-/// One that refuses is steered on at once, and one that only says that it does within seconds: nobody is locked out, and
+/// Gimbal statement 32, where it does not start again: one that refuses is steered on at once, and one that only says that it does within seconds: nobody is locked out, and
 /// nothing is told that did not happen.
 #[test]
 fn a_gimbal_that_does_not_start_again_is_steered_on() {
