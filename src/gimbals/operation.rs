@@ -386,7 +386,7 @@ pub enum OperationError {
     NotThere,
     #[error("the gimbal is still starting")]
     NotReady,
-    #[error("the same is being done already")]
+    #[error("the gimbal is busy with what was asked of it before. Try again")]
     Busy,
     /// `MAV_RESULT_DENIED`.
     #[error("the gimbal denied it")]

@@ -352,7 +352,7 @@ fn what_cannot_be_set_is_refused_at_once() {
         refused(&[("SEVENTEEN_LETTERS", 1.0)]),
         "the name of a parameter has 1 to 16 ASCII characters without blanks"
     );
-    assert_eq!(refused(&[("ALPHA", 1.0); 65]), "the same is being done already");
+    assert_eq!(refused(&[("ALPHA", 1.0); 65]), "the gimbal is busy with what was asked of it before. Try again");
     line.parameters.forget();
     line.parameters.set(line.now, ID, &[("ALPHA", 1.0)]);
     line.settle();
