@@ -297,8 +297,8 @@ fn while_it_starts_again_it_can_be_stopped_let_go_and_looked_at() {
     }
 }
 
-/// Gimbal statement 32, where nobody here asked for the restart: over a short cut of its power, and with ten seconds of silence, for which it
-/// counts as lost.
+/// Gimbal statement 32, where nobody here asked for the restart: over a short cut of its power, and with ten seconds of
+/// silence, for which it counts as lost.
 #[test]
 fn a_restart_that_nobody_asked_for_is_none_that_anything_waits_for() {
     for generation in [Generation::V1, Generation::V2] {
@@ -380,8 +380,8 @@ fn a_lost_answer_makes_no_difference() {
     }
 }
 
-/// Gimbal statement 32, where it does not start again: one that refuses is steered on at once, and one that only says that it does within seconds: nobody is locked out, and
-/// nothing is told that did not happen.
+/// Gimbal statement 32, where it does not start again: one that refuses is steered on at once, and one that only says that
+/// it does within seconds. Nobody is locked out, and nothing is told that did not happen.
 #[test]
 fn a_gimbal_that_does_not_start_again_is_steered_on() {
     for generation in [Generation::V1, Generation::V2] {
