@@ -18,6 +18,7 @@ mod firewall;
 mod gimbal_streams;
 mod heartbeat;
 mod identity;
+mod noise;
 mod outbox;
 mod own_commands;
 mod own_system;

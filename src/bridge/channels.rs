@@ -60,6 +60,10 @@ pub struct Link {
     pub reason: Option<String>,
     pub rx_frames: u64,
     pub rx_bytes: u64,
+    /// Of these, those until a look after the last frame.
+    pub rx_bytes_understood: u64,
+    /// The frames until that look.
+    pub rx_frames_seen: u64,
     pub tx_frames: u64,
     pub tx_bytes: u64,
     /// Of channels that are closed; those of open streams are added when shown.
@@ -75,6 +79,8 @@ impl Link {
             reason: None,
             rx_frames: 0,
             rx_bytes: 0,
+            rx_bytes_understood: 0,
+            rx_frames_seen: 0,
             tx_frames: 0,
             tx_bytes: 0,
             wire: WireCounters::default(),
@@ -121,6 +127,10 @@ impl Channels {
 
     pub fn links(&self) -> &[Link] {
         &self.links
+    }
+
+    pub fn links_mut(&mut self) -> &mut [Link] {
+        &mut self.links
     }
 
     /// The link of that index, `None` for one that was never configured.

@@ -45,6 +45,8 @@ pub enum Conflict {
     AutopilotTwice { autopilot: MavId, other_on: LinkIndex },
     /// A gimbal on another system id than the vehicle's; it is managed where its link is one of gimbals.
     ForeignSystem { device: MavId, system: u8, is_managed: bool },
+    /// On a serial link bytes come, and no frame.
+    NotMavlink { link: LinkIndex, baud: u32 },
     /// A gimbal takes the vehicle's heading for another than the autopilot does, by so much to the right.
     HeadingsApart { device: MavId, degrees: i16 },
     /// No manager component id is left.
@@ -138,9 +140,15 @@ impl Conflict {
                 name(*other_on)
             ),
             Self::DeviceOffItsLink { device, other_on } => format!(
-                "gimbal {device} is heard on link {}, but its [[gimbal]] entry names another link. Correct the entry, \
-                 or give the other gimbal another component id.",
+                "{device} is heard on link {}, but the gimbal of that id has a [[gimbal]] entry that names another link. If \
+                 these are two gimbals, give one of them another component id, on whatever link it is; if not, correct the \
+                 entry.",
                 name(*other_on)
+            ),
+            Self::NotMavlink { link, baud } => format!(
+                "what comes on link {} is no MAVLink. Is {baud} its baud rate? With gimbald stopped, 'gimbald scan' finds \
+                 it out.",
+                name(*link)
             ),
             Self::DeviceRenamed { former, device } => format!(
                 "gimbal {former} speaks as {device} now, but its [[gimbal]] entry has component_id = {}. Correct the \

@@ -21,6 +21,7 @@ impl Bridge {
         if self.identity.is_waiting() || self.identity.is_bootstrap() && self.is_fallback_taken(now) {
             self.conflicts.note(now, Conflict::FallbackTaken { waits: self.identity.is_waiting() });
         }
+        self.look_for_noise(now);
         if self.identity.system().is_none() {
             self.beat_on_bootstrap_links(now);
             return;

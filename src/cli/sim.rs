@@ -16,8 +16,10 @@ Examples:
   gimbald sim gimbal --endpoint udpout:127.0.0.1:14541
   gimbald sim gimbal --endpoint serial:/dev/ttyUSB1:115200 --component-id 171
   gimbald sim gimbal --endpoint udpout:127.0.0.1:14540 --system-id 33 --slew 80 --yaw-range 160
-  gimbald sim gimbal --endpoint udpout:127.0.0.1:14541 --family gremsy --gremsy-firmware 7.8.7
+  gimbald sim gimbal --endpoint udpin:127.0.0.1:14541 --family gremsy --gremsy-firmware 7.8.7
   gimbald sim gimbal --endpoint tcpin:0.0.0.0:5790 --fault drop=0.1 --fault reboot@20s --seed 7
+
+A Gremsy says nothing until it hears a heartbeat: let gimbald speak first, with udpout: in its link.
 
 Faults: {WORDS}.
 Each with a probability (drop=0.1), a duration (delay=250ms), or a time since the start (silence=5s@20s, reboot@20s).

@@ -211,6 +211,7 @@ impl GimbalManager {
                     self.status.is_some_and(|(_, status)| status.failures.contains(FailureFlags::CALIBRATION_RUNNING));
                 if calibrating { Err(Refusal::later("gimbal_calibrating")) } else { Ok(capabilities) }
             }
+            (DeviceState::Alive, None) => Err(Refusal::later("gimbal_unknown_yet")),
             _ => Err(Refusal::later("no_gimbal_yet")),
         }
     }

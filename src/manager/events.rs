@@ -272,6 +272,7 @@ fn explain(reason: &str) -> String {
         "not_an_id" => "it named something that is no id",
         "unknown_gimbal" => "it named a gimbal that is not here",
         "no_gimbal_yet" => "no gimbal was heard yet",
+        "gimbal_unknown_yet" => "the gimbal is heard, and has not told yet what it is",
         "gimbal_starting" => "the gimbal is starting; wait until it is ready, some 15 s, and ask again",
         "no_attitude" => "the attitude of the gimbal is not known",
         "no_heading" => "the heading of the vehicle is not known",

@@ -32,6 +32,12 @@ const ASK_EAGERLY_FOR: Duration = Duration::from_secs(30);
 /// … and so often from then on, for ever.
 const ASK_PATIENTLY_EVERY: Duration = Duration::from_secs(5);
 
+/// So often a gimbal was asked what it is when it is named as one that does not say.
+const SILENT_AFTER_REQUESTS: u32 = 25;
+const SAYS_NOTHING_OF_ITSELF: &str = "it is heard, and tells neither what it is (GIMBAL_DEVICE_INFORMATION) nor where it looks \
+    (GIMBAL_DEVICE_ATTITUDE_STATUS), so that it cannot be steered. Check that what is sent arrives there. If it does, this is \
+    no device of gimbal protocol v2: leave its family out of the configuration, and it is found out";
+
 /// The first requests go to everybody, as the guide has it; then to the one device heard.
 const BROADCAST_REQUESTS: u32 = 2;
 
@@ -317,7 +323,9 @@ impl GimbalDriver for MavlinkV2Driver {
     }
 
     fn details(&self, _now: Timestamp) -> GimbalDetails {
-        let faults = if self.says_gremsy { vec![gremsy::wrong_family(Family::MavlinkV2)] } else { Vec::new() };
-        GimbalDetails { faults, ..GimbalDetails::default() }
+        let gremsy = self.says_gremsy.then(|| gremsy::wrong_family(Family::MavlinkV2));
+        let is_silent = self.alive && !self.known && self.requests >= SILENT_AFTER_REQUESTS;
+        let silent = is_silent.then(|| SAYS_NOTHING_OF_ITSELF.to_owned());
+        GimbalDetails { faults: gremsy.into_iter().chain(silent).collect(), ..GimbalDetails::default() }
     }
 }

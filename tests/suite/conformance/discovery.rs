@@ -109,6 +109,29 @@ fn item_26_the_request_is_repeated_for_ever() {
     assert!(later.iter().all(|(_, request)| (request.target_system, request.target_component) == (1, 154)));
 }
 
+/// Checklist 30, where 285 does not come either: it is heard and cannot be steered, and whoever looks is told why and what to
+/// do.
+#[test]
+fn a_gimbal_that_says_nothing_of_itself_is_named() {
+    let (mut world, places) = World::empty(three_links());
+    let silent = "it is heard, and tells neither what it is (GIMBAL_DEVICE_INFORMATION) nor where it looks \
+                  (GIMBAL_DEVICE_ATTITUDE_STATUS), so that it cannot be steered. Check that what is sent arrives there. If it \
+                  does, this is no device of gimbal protocol v2: leave its family out of the configuration, and it is found out";
+    let entry = GimbalSettings { family: Family::MavlinkV2, ..GimbalSettings::found("camera".to_owned()) };
+    world.start(Settings { gimbals: vec![entry], ..three_links() });
+    let beats = [(SECOND, places.gimbal, GIMBAL, gimbal_heartbeat())];
+    world.run_with(20 * SECOND, &beats);
+    assert_eq!(world.snapshot().gimbals[0].details.faults, [""; 0]);
+    world.run_with(6 * SECOND, &beats);
+    assert_eq!(world.snapshot().gimbals[0].details.faults, [silent]);
+    assert_eq!(world.result_of(places.ground, GCS, &down()), Some(TEMPORARILY_REJECTED));
+    assert_eq!(world.snapshot().gimbals[0].rejected["255/190"]["gimbal_unknown_yet"], 1);
+
+    introduce(&mut world, places.gimbal, GIMBAL);
+    assert_eq!(world.snapshot().gimbals[0].details.faults, [""; 0]);
+    assert_eq!(world.result_of(places.ground, GCS, &down()), Some(ACCEPTED));
+}
+
 /// "When 283 arrives, exactly one unsolicited 280 for id 154 is broadcast on all links within 100 ms."
 /// Protocol checklist 29: "When 283 arrives without any COMMAND_ACK, discovery still succeeds." (D14 keeps 280 from
 /// links of gimbals.)

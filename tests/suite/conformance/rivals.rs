@@ -229,6 +229,34 @@ fn a44_the_gimbal_hears_of_no_manager_but_ours() {
     assert_eq!(world.take(places.gimbal), []);
 }
 
+/// A wrong baud rate looks like this: bytes come, and no frame. It is over when frames come.
+#[test]
+fn a_serial_line_without_mavlink_is_named() {
+    let named = [
+        "what comes on link serial is no MAVLink. Is 57600 its baud rate? With gimbald stopped, 'gimbald scan' finds it out.",
+    ];
+    let noise: Vec<u8> = (0..100).map(|at: u8| at.wrapping_mul(37) & 0x7f).collect();
+    let shown = |transport, with_frames: bool| {
+        let links = vec![link("serial", Role::Gimbal, transport)];
+        let (mut world, places) = World::new(Settings { links, ..Settings::default() });
+        let mut seen = Vec::new();
+        for second in 0..6 {
+            world.send_bytes(places[0], &noise);
+            if with_frames && second % 2 == 0 {
+                world.send(places[0], GIMBAL, &heartbeat(26, 8));
+            }
+            world.run_for(SECOND);
+            seen.push(world.snapshot().conflicts.contains(&named[0].to_owned()));
+        }
+        seen
+    };
+    let serial = Transport::Serial { baud: 57_600 };
+    assert_eq!(shown(serial, false), [false, false, true, true, true, true]);
+    assert_eq!(shown(serial, true), [false; 6]);
+    // There every datagram is whole or nothing, and no rate can be wrong.
+    assert_eq!(shown(Transport::Datagrams, false), [false; 6]);
+}
+
 /// R15: "addressed to us or to component 0, through the same gate": who says it to no component in particular is nobody's
 /// rival, but where the gimbal obeys it besides.
 #[test]
