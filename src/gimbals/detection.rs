@@ -4,7 +4,8 @@
 //! says it is a Gremsy's is driven as one. One that gives no sign of being a v2 device is asked for parameters that only a
 //! Gremsy has, and otherwise taken for a v1 gimbal: soon when it tells where it looks by a message of v1, late when it sends
 //! nothing but heartbeats. Nothing of this moves it. Whenever a sign of v2 comes after all, it is a v2 device again, and one
-//! that is taken for a v1 gimbal is asked on for what only a Gremsy has. What a v2 device says of itself outweighs the name
+//! that is taken for a v1 gimbal is asked on for what only a Gremsy has. One that was lost is taken for what it was and judged
+//! again, for another may have come in its place. What a v2 device says of itself outweighs the name
 //! of a parameter, which anybody may use.
 
 use std::collections::VecDeque;
@@ -53,6 +54,8 @@ pub struct Detection {
     evidence: Evidence,
     /// That it is there was reported, and that it is lost was not.
     is_reported: bool,
+    /// It was lost and has not beaten since: what comes back may be another.
+    was_lost: bool,
     /// How it was last told to turn, while it is not told anything else.
     turning: Option<Turning>,
     /// An earlier run found out that these words stop it.
@@ -61,7 +64,7 @@ pub struct Detection {
     outputs: VecDeque<DriverOutput>,
 }
 
-/// What the device said of its family since it was adopted.
+/// What the device said of its family since it was adopted, or lost.
 #[derive(Clone, Copy, Debug, Default)]
 struct Evidence {
     v2: bool,
@@ -89,6 +92,7 @@ impl Detection {
             other: None,
             evidence: Evidence::default(),
             is_reported: false,
+            was_lost: false,
             turning: None,
             stops_as: None,
             timers: TimerTable::default(),
@@ -147,9 +151,22 @@ impl Detection {
     fn weigh(&mut self, now: Timestamp, frame: &Frame<'_>) {
         // One of these speaks both v1 and v2, and says by 283 that it is one.
         if self.family() == Family::Gremsy {
-            if frame.message_id() == message::GIMBAL_DEVICE_INFORMATION && gremsy::is_denied_by(frame) {
-                self.evidence.v2 = true;
-                self.take(now, Family::MavlinkV2);
+            match frame.message_id() {
+                message::GIMBAL_DEVICE_INFORMATION if gremsy::is_denied_by(frame) => {
+                    self.evidence.v2 = true;
+                    self.take(now, Family::MavlinkV2);
+                }
+                message::GIMBAL_DEVICE_INFORMATION | message::PARAM_VALUE if gremsy::is_known_by(frame) => {
+                    self.was_lost = false;
+                    self.stop_judging();
+                }
+                // It has time to say that it is one still.
+                message::HEARTBEAT if std::mem::take(&mut self.was_lost) => {
+                    self.evidence.questions = 0;
+                    self.timers.set(Timer::AskParameters, now + ASK_PARAMETERS_AFTER);
+                    self.timers.set(Timer::JudgeBySilence, now + V1_BY_ITS_SILENCE_AFTER);
+                }
+                _ => {}
             }
             return;
         }
@@ -220,6 +237,9 @@ impl Detection {
                 }
                 DriverOutput::Report(Report::Lost) => {
                     self.is_reported = false;
+                    self.was_lost = true;
+                    // What it said speaks for none that comes in its place.
+                    self.evidence = Evidence::default();
                     self.stop_judging();
                     self.outputs.push_back(output);
                 }

@@ -1,5 +1,7 @@
 //! `family = "auto"`: what a gimbal speaks is found out by listening, and nothing of that moves it.
 
+mod replaced;
+
 use std::cell::Cell;
 use std::rc::Rc;
 use std::time::Duration;

@@ -1,0 +1,43 @@
+//! Another gimbal takes the place of one that was lost.
+
+use super::*;
+
+const KINDS: [&str; 4] = ["mavlink_v1", "mavlink_v2", "gremsy v1", "gremsy v2"];
+
+fn install(world: &mut World, places: Places, kind: &str) {
+    let now = world.now;
+    let gremsy = |generation| gremsy::Device::new(now, gremsy::DeviceSettings::of(generation));
+    match kind {
+        "mavlink_v1" => world.install(places.gimbal, Device::new(now, DeviceSettings::default())),
+        "mavlink_v2" => world.install(places.gimbal, v2::Device::new(now, v2::DeviceSettings::default())),
+        "gremsy v1" => world.install(places.gimbal, gremsy(gremsy::Generation::V1)),
+        _ => world.install(places.gimbal, gremsy(gremsy::Generation::V2)),
+    }
+}
+
+/// What a gimbal said of itself speaks for none that comes in its place: another family at the same port, under the same
+/// id, is found out as in the beginning, but that a Gremsy has 20 s to say that it is one still.
+#[test]
+fn another_family_in_the_place_of_one_that_was_lost_is_found_out() {
+    for before in KINDS {
+        for after in KINDS {
+            let (mut world, places) = World::empty(three_links());
+            world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
+            install(&mut world, places, before);
+            run(&mut world, places, 25 * SECOND);
+            assert!(before.starts_with(&family(&world)), "{before}");
+            world.remove(places.gimbal);
+            run(&mut world, places, 15 * SECOND);
+            assert_eq!(world.snapshot().gimbals[0].state, "lost", "{before}");
+
+            install(&mut world, places, after);
+            run(&mut world, places, 30 * SECOND);
+            // And for good.
+            for _ in 0..20 {
+                assert!(after.starts_with(&family(&world)), "{before} to {after}: {}", family(&world));
+                assert_eq!(world.snapshot().gimbals[0].state, "alive", "{before} to {after}");
+                run(&mut world, places, SECOND);
+            }
+        }
+    }
+}
