@@ -324,7 +324,7 @@ fn item_179_at_the_end_the_gimbal_is_stopped_and_goodbye_said() {
         assert_eq!((stopped.angular_velocity_y, stopped.angular_velocity_z), (0.0, 0.0));
         assert_eq!((zero.at - ended).as_millis(), after_ms);
     }
-    assert_eq!(world.stored_turning, ["gimbal-154"], "whether it has heard one is not known");
+    assert_eq!(world.stored_turning, ["gimbal-154\t1/154"], "whether it has heard one is not known");
     for place in [places.autopilot, places.ground] {
         let beats: Vec<HEARTBEAT_DATA> = of(&world.take(place));
         assert_eq!(beats.iter().map(|beat| beat.system_status).collect::<Vec<_>>(), [7]);
