@@ -4,6 +4,7 @@
 mod away;
 mod killed;
 mod renamed;
+mod schedules;
 
 use std::time::Duration;
 
