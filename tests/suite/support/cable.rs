@@ -6,7 +6,8 @@ use std::rc::Rc;
 use gimbald::sim::peer::{Peer, PlatformMotion};
 use gimbald::timestamp::Timestamp;
 use gimbald::wire::dialect::{
-    COMMAND_LONG_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA, MavMessage, PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA,
+    COMMAND_LONG_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA, GIMBAL_MANAGER_STATUS_DATA, MavMessage,
+    PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA,
 };
 use gimbald::wire::target::message_shape;
 use gimbald::wire::{DatagramFrames, Frame, FrameBuffer, MavId};
@@ -95,6 +96,13 @@ fn towards_gimbal(bytes: &[u8], alias: MavId) -> Option<Vec<u8>> {
         (*system, *component) = if target == alias { (GIMBAL.system, GIMBAL.component) } else { (*system, *component) };
         target != GIMBAL
     };
+    if let Some(mut status) = frame.decode::<GIMBAL_MANAGER_STATUS_DATA>() {
+        let is_its = status.gimbal_device_id == alias.component;
+        status.gimbal_device_id = GIMBAL.component;
+        let message = MavMessage::GIMBAL_MANAGER_STATUS(status);
+        let encode = || FrameBuffer::default().encode_any(frame.source(), frame.sequence(), &message).bytes().to_vec();
+        return is_its.then(encode);
+    }
     let changed = with_target(&frame, is_its)?;
     Some(changed.unwrap_or_else(|| bytes.to_vec()))
 }

@@ -9,8 +9,8 @@ use std::time::Duration;
 
 use crate::timestamp::Timestamp;
 
-/// What is not answered by then is not answered any more.
-const ANSWERED_WITHIN: Duration = Duration::from_millis(500);
+/// What is not answered by then is not answered any more. On a full line answers come more than a second late.
+const ANSWERED_WITHIN: Duration = Duration::from_secs(2);
 
 #[derive(Debug, Default)]
 pub struct Rotation {
@@ -98,8 +98,27 @@ mod tests {
         assert!(!rotation.may_turn());
         // What was never answered is not waited for.
         rotation.handle_sent(at(1_000), true);
-        rotation.handle_sent(at(2_000), false);
+        rotation.handle_sent(at(3_001), false);
         rotation.handle_answer(true);
+        assert!(!rotation.may_turn());
+    }
+
+    #[test]
+    fn late_answers_to_the_rate_are_none_to_a_stop_that_was_lost() {
+        let late = 1_200;
+        let mut rotation = Rotation::default();
+        for millis in (0..5_000).step_by(100) {
+            // Of the zeros, which begin at 3 s, those of the first second are lost.
+            rotation.handle_sent(at(millis), millis < 3_000);
+            let answered = millis.checked_sub(late).filter(|sent| !(3_000..4_000).contains(sent));
+            if answered.is_some() {
+                rotation.handle_answer(true);
+            }
+            assert!(rotation.may_turn() || millis >= 4_000 + late, "at {millis}");
+        }
+        for _ in 0..20 {
+            rotation.handle_answer(true);
+        }
         assert!(!rotation.may_turn());
     }
 }
