@@ -47,7 +47,7 @@ enum Kind {
     GivenBack,
     TakenOver,
     Refused,
-    Misread,
+    Misread(&'static str),
     AcquireWar,
     Fault(&'static str),
 }
@@ -86,7 +86,7 @@ impl Announcements {
         // Most events are not told, and of those that come by the stream only the first: that one is put into words.
         let (kind, who) = kind_of(subject, event)?;
         let (severity, kept) = match kind {
-            Kind::Refused | Kind::Misread => (severity::NOTICE, NOT_FOR_REFUSALS),
+            Kind::Refused | Kind::Misread(_) => (severity::NOTICE, NOT_FOR_REFUSALS),
             Kind::AcquireWar => (severity::WARNING, 0),
             _ => (severity::NOTICE, 0),
         };
@@ -149,7 +149,7 @@ fn kind_of(subject: Subject<'_>, event: &Event) -> Option<(Kind, MavId)> {
         // PX4 streams what it would have the gimbal do, and counts on being ignored while it has no control.
         Event::Refused { who, reason: "not_in_control", .. } if subject.autopilot == Some(who) => None,
         Event::Refused { who, holder: Some(_), .. } => Some((Kind::Refused, who)),
-        Event::Refused { who, holder: None, reason } => misread(reason).map(|_| (Kind::Misread, who)),
+        Event::Refused { who, holder: None, reason } => misread(reason).map(|looks| (Kind::Misread(looks), who)),
         _ => None,
     }
 }
@@ -167,7 +167,7 @@ fn text_of(kind: Kind, who: MavId, names: Names, event: &Event) -> String {
         Kind::AcquireWar => format!("acquire war, {who} keeps control"),
         Kind::Refused if reason == "holder_must_release" => format!("{who} asks {whom} for control"),
         Kind::Refused => format!("{who} refused, {whom} in control"),
-        Kind::Misread => format!("{who}: {}", misread(reason).unwrap_or(reason)),
+        Kind::Misread(looks) => format!("{who}: {looks}"),
     }
 }
 
@@ -175,9 +175,9 @@ fn text_of(kind: Kind, who: MavId, names: Names, event: &Event) -> String {
 /// old programs do not look at the answer, and messages have none.
 fn misread(reason: &str) -> Option<&'static str> {
     match reason {
-        "looks_like_centidegrees" => Some("see accept_centidegrees"),
-        "looks_like_a_place" => Some("looks like a place"),
-        "place_in_the_first_parameters" => Some("place in params 1 to 3"),
+        "looks_like_centidegrees" => Some("refused, accept_centidegrees?"),
+        "looks_like_a_place" => Some("refused, place without mode 4"),
+        "place_in_the_first_parameters" => Some("refused, place in params 1-3"),
         _ => None,
     }
 }

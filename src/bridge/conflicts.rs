@@ -100,6 +100,11 @@ impl Conflict {
                     Some(Autopilot::ArduPilot) if may_be_hosted => {
                         format!(" Or let it steer through us: MNT{mount}_TYPE 6 and [autopilot] present_device = true.")
                     }
+                    // A ground station or a script may mean well.
+                    None if may_be_hosted => {
+                        " If it is a client of ours, let it speak to the gimbal's manager, or to component 0."
+                            .to_owned()
+                    }
                     _ => String::new(),
                 };
                 let remedy = remedy(*autopilot, mount);

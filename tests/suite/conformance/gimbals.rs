@@ -411,6 +411,8 @@ fn of_two_devices_under_one_id_the_second_comes_next_and_stays() {
     assert!(rig.conducts(rig.gimbals), "it did");
 
     rig.speak_for(11 * SECOND, &[second]);
+    // One that is lost and then only beats is judged anew.
+    rig.introduce(rig.peer, GIMBAL);
     assert!(rig.conducts(rig.peer));
     for _ in 0..30 {
         rig.speak_for(SECOND, &[first, second]);

@@ -56,7 +56,8 @@ fn statement_38_centidegrees_are_taken_where_they_are_accepted() {
     assert_eq!(doubts[0].text, "255/190 is taken to send hundredths of a degree (accept_centidegrees)");
 }
 
-/// "Trap recognition": what was refused for how it looks is said on the pilot's screen, of each sender once in ten seconds.
+/// "Trap recognition": what was refused for how it looks is said on the pilot's screen, of each sender and each kind once in ten
+/// seconds.
 /// Gimbal statement 38: "DENIED with a warning", which names the setting.
 #[test]
 fn statement_38_the_pilot_is_told_what_looks_like_centidegrees() {
@@ -66,6 +67,7 @@ fn statement_38_the_pilot_is_told_what_looks_like_centidegrees() {
         world.send(places.ground, GCS, &control([-4_500.0, 0.0, 0.0], 2.0));
     }
     world.send(places.ground, GCS, &mount_control(MANAGER, [473_977_420, 85_455_940, 1_000]));
+    world.run_for(SECOND);
     world.send(
         places.ground,
         COMPANION,
@@ -74,7 +76,12 @@ fn statement_38_the_pilot_is_told_what_looks_like_centidegrees() {
     world.run_for(SECOND);
     let heard = world.take(places.ground);
     let texts: Vec<String> = of::<STATUSTEXT_DATA>(&heard).iter().map(text_of).collect();
-    assert_eq!(texts, ["gimbal-154: 255/190: see accept_centidegrees", "gimbal-154: 1/192: place in params 1 to 3"]);
+    let expected = [
+        "gimbal-154: 255/190: refused, accept_centidegrees?",
+        "gimbal-154: 255/190: refused, place without mode 4",
+        "gimbal-154: 1/192: refused, place in params 1-3",
+    ];
+    assert_eq!(texts, expected);
     let rejected = world.snapshot().gimbals[0].rejected.clone();
     assert_eq!(rejected["255/190"]["looks_like_centidegrees"], 5);
     assert_eq!(rejected["255/190"]["looks_like_a_place"], 1);
