@@ -414,6 +414,9 @@ fn of_two_devices_under_one_id_the_second_comes_next_and_stays() {
     // One that is lost and then only beats is judged anew.
     rig.introduce(rig.peer, GIMBAL);
     assert!(rig.conducts(rig.peer));
+    // It is asked who it is, as it comes after another.
+    let information = MavMessage::GIMBAL_DEVICE_INFORMATION(device_information(rig.world.now, usual_capabilities()));
+    rig.world.send(rig.peer, GIMBAL, &information);
     for _ in 0..30 {
         rig.speak_for(SECOND, &[first, second]);
         assert!(rig.conducts(rig.peer) && !rig.conducts(rig.gimbals));
