@@ -32,7 +32,7 @@ use crate::gimbals::capabilities::Capabilities;
 use crate::gimbals::details::GimbalDetails;
 use crate::gimbals::driver::{CommandOutcome, DriverOutput, GimbalDriver};
 use crate::gimbals::gremsy::is_vendor;
-use crate::gimbals::gremsy::parameters::{Axis, Parameter, ParameterTable};
+use crate::gimbals::gremsy::parameters::{Axis, EncoderType, Parameter, ParameterTable};
 use crate::gimbals::mavlink_v2::MavlinkV2Driver;
 use crate::gimbals::mavlink_v2::packet::{DeviceInformation, read_information};
 use crate::gimbals::operation::{Operation, OperationId};
@@ -107,6 +107,8 @@ pub struct GremsyDriver {
     /// Its radio receiver was given the gimbal.
     is_handed_over: bool,
     operations: Operations,
+    /// It is being told another unit for its encoders, and may send either.
+    unit_change: Option<OperationId>,
     heard: Heard,
     vehicle_turn: VehicleTurn,
     negated: Negated,
@@ -123,7 +125,8 @@ struct Heard {
     heartbeat: Option<Timestamp>,
     status: Option<(Timestamp, SystemStatus)>,
     imu: Option<(Timestamp, RawImu)>,
-    encoders: Option<(Timestamp, Encoders)>,
+    /// With the unit in which it was sent.
+    encoders: Option<(Timestamp, Encoders, EncoderType)>,
     orientation: Option<(Timestamp, Orientation)>,
     /// As it was reported.
     attitude: Option<(Timestamp, GimbalStatus)>,
@@ -173,6 +176,7 @@ impl GremsyDriver {
             is_start_told: true,
             is_handed_over: false,
             operations: Operations::default(),
+            unit_change: None,
             heard: Heard::default(),
             vehicle_turn: VehicleTurn::default(),
             negated: settings.negated(),
@@ -216,7 +220,10 @@ impl GremsyDriver {
             match output {
                 ParameterOutput::Send(message) => self.outputs.push_back(DriverOutput::Message(message)),
                 ParameterOutput::Settled => {}
-                ParameterOutput::Done { id, result } => self.operated(id, result),
+                ParameterOutput::Done { id, result } => {
+                    self.unit_change.take_if(|change| *change == id);
+                    self.operated(id, result);
+                }
             }
         }
     }
@@ -290,7 +297,9 @@ impl GimbalDriver for GremsyDriver {
             message::MOUNT_ORIENTATION => self.handle_orientation(now, device, frame),
             message::MOUNT_STATUS => {
                 // The encoders, and never where it looks.
-                self.heard.encoders = Encoders::read(frame).map(|encoders| (now, encoders)).or(self.heard.encoders);
+                if let Some(encoders) = Encoders::read(frame).filter(|_| self.unit_change.is_none()) {
+                    self.heard.encoders = Some((now, encoders, self.encoder_type()));
+                }
             }
             message::RAW_IMU => self.heard.imu = RawImu::read(frame).map(|imu| (now, imu)).or(self.heard.imu),
             message::COMMAND_ACK => self.handle_ack(frame),

@@ -5,6 +5,7 @@
 
 mod bad_line;
 mod faults;
+mod motors;
 mod operations;
 mod restarting;
 mod start_up;

@@ -45,7 +45,7 @@ impl GremsyDriver {
             output_filter: motors.output_filter.map(f64::from),
             gain: motors.gain.map(f64::from),
             radio_type: self.number(Parameter::RcType).map(|code| RcType::from_code(code).to_string()),
-            encoder_unit: self.encoder_type().map(|kind| encoder_unit(kind).to_owned()),
+            encoder_unit: self.told_encoder_type().map(|kind| encoder_unit(kind).to_owned()),
             combined_attitude: flag(AxisFlags::COMBINE_ATTITUDE),
             home_on_mode_change: flag(AxisFlags::HOME_ON_MODE_CHANGE),
             streams: self.streams(now),
@@ -85,15 +85,18 @@ impl GremsyDriver {
         }
     }
 
-    fn encoder_type(&self) -> Option<EncoderType> {
+    fn told_encoder_type(&self) -> Option<EncoderType> {
         self.number(Parameter::EncoderType).and_then(EncoderType::from_value)
     }
 
+    /// The vendor's default, where it does not say.
+    pub(super) fn encoder_type(&self) -> EncoderType {
+        self.told_encoder_type().unwrap_or(EncoderType::Counts)
+    }
+
     fn encoders(&self, now: Timestamp) -> Option<EncoderDetails> {
-        let (at, encoders) = self.heard.encoders?;
-        // The vendor's default, where it does not say.
-        let [tilt_deg, roll_deg, pan_deg] =
-            encoders.angles(self.encoder_type().unwrap_or(EncoderType::Counts)).map(Angle::degrees);
+        let (at, encoders, unit) = self.heard.encoders.filter(|(.., unit)| *unit == self.encoder_type())?;
+        let [tilt_deg, roll_deg, pan_deg] = encoders.angles(unit).map(Angle::degrees);
         Some(EncoderDetails { tilt_deg, roll_deg, pan_deg, raw: encoders.0, age_ms: millis(now.since(at)) })
     }
 
@@ -142,7 +145,7 @@ impl GremsyDriver {
             ("HEARTBEAT", heard.heartbeat),
             ("SYS_STATUS", heard.status.map(|(at, _)| at)),
             ("RAW_IMU", heard.imu.map(|(at, _)| at)),
-            ("MOUNT_STATUS", heard.encoders.map(|(at, _)| at)),
+            ("MOUNT_STATUS", heard.encoders.map(|(at, ..)| at)),
             ("MOUNT_ORIENTATION", heard.orientation.map(|(at, _)| at)),
             ("GIMBAL_DEVICE_INFORMATION", heard.information),
             ("GIMBAL_DEVICE_ATTITUDE_STATUS", heard.device_status),

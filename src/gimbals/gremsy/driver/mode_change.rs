@@ -33,6 +33,10 @@ impl ModeChange {
         Self { mode, asker, sends: 0, next: now }
     }
 
+    pub const fn mode(&self) -> ControlMode {
+        self.mode
+    }
+
     pub const fn asker(&self) -> Option<OperationId> {
         self.asker
     }

@@ -8,7 +8,7 @@ use crate::geometry::{Angle, Attitude, EarthFrame, GimbalAngles, VehicleFrame, Y
 use crate::gimbals::driver::{CommandOutcome, DriverOutput, GimbalDriver};
 use crate::gimbals::gremsy::modes::ControlMode;
 use crate::gimbals::gremsy::packet::{self, RebootAction};
-use crate::gimbals::gremsy::parameters::ParameterTable;
+use crate::gimbals::gremsy::parameters::{Parameter, ParameterTable};
 use crate::gimbals::gremsy::status::SystemStatus;
 use crate::gimbals::operation::{
     Motors, Operation, OperationError, OperationId, OperationResult, ResetMode, Restart, Stream, StreamRate, YawMode,
@@ -18,7 +18,7 @@ use crate::gimbals::setpoint::{Pointing, RadioControl, Setpoint, Stabilised};
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 use crate::wire::dialect::COMMAND_LONG_DATA;
-use crate::wire::ids::{CommandResult, message};
+use crate::wire::ids::{CommandResult, GimbalFlags, message};
 
 /// So many commands are waited for at once.
 const CAPACITY: usize = 16;
@@ -156,7 +156,7 @@ impl GremsyDriver {
         }
         match operation {
             Operation::RefreshParameters => self.parameters.refresh_for(now, id),
-            Operation::SetParameter { name, value } => self.parameters.set(now, id, &[(name, *value)]),
+            Operation::SetParameter { name, value } => self.set_parameters(now, id, &[(name, *value)]),
             Operation::RequestInformation => {
                 let command = packet::request_message(device, message::GIMBAL_DEVICE_INFORMATION);
                 self.ask(now, id, command, Goal::Answer);
@@ -220,7 +220,30 @@ impl GremsyDriver {
         if self.mode_change.is_some_and(|change| change.asker().is_some()) {
             return self.operated(id, Err(OperationError::Busy));
         }
+        // What switches them on takes it home as well.
+        if mode == ControlMode::Reset && self.motors_run() {
+            return self.operated(id, Ok(()));
+        }
         self.mode_change = Some(ModeChange::new(now, mode, Some(id)));
+    }
+
+    /// In v2: nothing says that they are off, or are to be.
+    fn motors_run(&self) -> bool {
+        let are_on = self.heard.status.is_some_and(|(_, status)| status.motors_on());
+        let is_retracted = self.heard.attitude.is_none_or(|(_, status)| status.flags.contains(GimbalFlags::RETRACT));
+        let are_switched = self.operations.pending.iter().any(|pending| matches!(pending.goal, Goal::Motors { .. }));
+        are_on && !is_retracted && !are_switched && self.mode_change.is_none()
+    }
+
+    /// In v2 its flags say that it has taken the mode; the motors follow, and the status tells when.
+    pub(super) fn handle_mode_taken(&mut self, now: Timestamp, id: OperationId, mode: ControlMode) {
+        let on = match mode {
+            ControlMode::Reset => true,
+            ControlMode::Off => false,
+            ControlMode::Lock | ControlMode::Follow | ControlMode::Mapping => return self.operated(id, Ok(())),
+        };
+        let stage = Stage::Shown { until: now + MOTORS_SHOW_WITHIN };
+        self.operations.pending.push(Pending { id, stage, goal: Goal::Motors { on } });
     }
 
     /// In v2 a reset is a direction, made of where the gimbal looks. What it keeps is kept in the frame in which it was
@@ -261,9 +284,17 @@ impl GremsyDriver {
             Some(Ok(writes)) => {
                 let writes: Vec<(&str, f64)> =
                     writes.iter().map(|write| (write.name, f64::from(write.value))).collect();
-                self.parameters.set(now, id, &writes);
+                self.set_parameters(now, id, &writes);
             }
         }
+    }
+
+    fn set_parameters(&mut self, now: Timestamp, id: OperationId, writes: &[(&str, f64)]) {
+        let unit = self.table().and_then(|table| table.name(Parameter::EncoderType));
+        if writes.iter().any(|(name, _)| Some(*name) == unit) {
+            self.unit_change = Some(id);
+        }
+        self.parameters.set(now, id, writes);
     }
 
     pub(super) fn table(&self) -> Option<ParameterTable> {

@@ -106,13 +106,25 @@ impl GremsyDriver {
         self.is_handed_over = false;
         self.hand_over_waits = false;
         match self.mode_change {
-            // It is to move, and its motors are being switched on for that.
-            Some(change) if change.asker().is_none() && !is_stop => return,
+            // It is to move, and its motors are being switched on, for that or by name: what it is told waits for them.
+            Some(change)
+                if !is_stop
+                    && (change.asker().is_none()
+                        || change.mode() == ControlMode::Reset && setpoint != Setpoint::Retract) =>
+            {
+                if self.turning.is_some() && matches!(setpoint, Setpoint::Turn(_)) {
+                    self.timers.set(Timer::DeadMan, now + DEAD_MAN);
+                }
+                return;
+            }
             Some(change) if !is_stop => {
                 self.mode_change = None;
                 if let Some(id) = change.asker() {
-                    let text = "another demand took its place".to_owned();
-                    self.operated(id, Err(OperationError::NoEffect(text)));
+                    let text = match change.mode() {
+                        ControlMode::Reset => "it is told to retract, which keeps its motors off",
+                        _ => "another demand took its place",
+                    };
+                    self.operated(id, Err(OperationError::NoEffect(text.to_owned())));
                 }
             }
             _ => {}
@@ -217,11 +229,12 @@ impl GremsyDriver {
                 self.send_mode(device, mode);
             }
             Some(mode_change::Step::Done(asker, result)) => {
-                self.mode_change = None;
-                match asker {
-                    Some(id) => self.operated(id, result),
-                    None if result.is_err() => self.raise(Fault::StaysRetracted),
-                    None => {}
+                let mode = self.mode_change.take().map(|change| change.mode());
+                match (asker, mode) {
+                    (Some(id), Some(mode)) if result.is_ok() => self.handle_mode_taken(now, id, mode),
+                    (Some(id), _) => self.operated(id, result),
+                    (None, _) if result.is_err() => self.raise(Fault::StaysRetracted),
+                    (None, _) => {}
                 }
             }
         }

@@ -1,0 +1,116 @@
+//! Motors that are switched on and off by name, while it is told to look somewhere.
+
+use gimbald::gimbals::operation::{Motors, OperationError};
+use gimbald::manager::asked::NotDone;
+
+use super::*;
+
+const FAULT: &str = "it was told to move while its motors are off. Switch them on";
+
+/// Asks for motors, and lets so much time pass.
+fn ask_for(world: &mut World, places: Places, motors: Motors, duration: Duration) -> OperationId {
+    let id = OperationId(1_000 + world.answers.len() as u64);
+    let asked = Asked::Operation(Operation::Motors(motors));
+    world.input(Input::Asked { id, gimbal: "camera", asked: &asked });
+    run(world, places, duration);
+    id
+}
+
+fn answer_of(world: &World, id: OperationId) -> Option<Answer> {
+    world.answers.iter().find(|(answered, _)| *answered == id).map(|(_, answer)| answer.clone())
+}
+
+/// "It was told to move while its motors are off. Switch them on": who does that is no other demand, and it goes where it
+/// was told to look.
+#[test]
+fn the_remedy_for_motors_that_are_off_helps() {
+    for generation in [Generation::V1, Generation::V2] {
+        for after in [300, 310, 325, 340] {
+            let (mut world, places) = running(generation);
+            take_control(&mut world);
+            assert_eq!(operate(&mut world, places, Operation::Motors(Motors::Off)), Some(Ok(())));
+            point(&mut world, -30.0, 20.0);
+            run(&mut world, places, Duration::from_millis(after));
+            assert_eq!(seen(&world).details.faults, [FAULT], "{generation:?}");
+
+            let id = ask_for(&mut world, places, Motors::On, 8 * SECOND);
+
+            assert_eq!(answer_of(&world, id), Some(Ok(())), "{generation:?} {after}");
+            assert_eq!(seen(&world).details.faults, [""; 0], "{generation:?}");
+            assert_looks(&world, -30.0, 20.0);
+        }
+    }
+}
+
+/// A new demand while they start is obeyed when they run, and is no reason for not switching them on.
+#[test]
+fn a_demand_while_they_start_waits_for_them() {
+    for generation in [Generation::V1, Generation::V2] {
+        // Its flags are told twenty times a second.
+        for before in [0, 10, 20, 30, 40] {
+            let (mut world, places) = running(generation);
+            take_control(&mut world);
+            assert_eq!(operate(&mut world, places, Operation::Motors(Motors::Off)), Some(Ok(())));
+            run(&mut world, places, Duration::from_millis(before));
+            let id = ask_for(&mut world, places, Motors::On, Duration::ZERO);
+            point(&mut world, -20.0, 10.0);
+            run(&mut world, places, 8 * SECOND);
+            assert_eq!(answer_of(&world, id), Some(Ok(())), "{generation:?} {before}");
+            assert_looks(&world, -20.0, 10.0);
+        }
+    }
+}
+
+/// "Answered … with the result when the gimbal has done them": when its status shows it, in either generation.
+#[test]
+fn motors_are_answered_when_the_status_shows_it() {
+    for generation in [Generation::V1, Generation::V2] {
+        let (mut world, places) = running(generation);
+        take_control(&mut world);
+        for (motors, is_on) in [(Motors::Off, false), (Motors::On, true)] {
+            let id = ask_for(&mut world, places, motors, Duration::ZERO);
+            for _ in 0..600 {
+                run(&mut world, places, Duration::from_millis(10));
+                let shown = seen(&world).details.motors_on == Some(is_on);
+                assert_eq!(answer_of(&world, id), shown.then_some(Ok(())), "{generation:?} {motors:?}");
+            }
+            assert_eq!(answer_of(&world, id), Some(Ok(())), "{generation:?} {motors:?}");
+        }
+    }
+}
+
+/// Nothing moves that nobody asked to move: motors that run are left alone.
+#[test]
+fn motors_that_run_are_not_switched_on_by_way_of_home() {
+    let (mut world, places) = running(Generation::V2);
+    take_control(&mut world);
+    point(&mut world, -30.0, 20.0);
+    run(&mut world, places, 5 * SECOND);
+    world.forget();
+
+    let id = ask_for(&mut world, places, Motors::On, 2 * SECOND);
+
+    assert_eq!(answer_of(&world, id), Some(Ok(())));
+    let (commands, setpoints) = orders(&mut world, places);
+    assert_eq!(commands, []);
+    let home = gimbald::wire::ids::GimbalFlags::NEUTRAL.bits();
+    assert!(setpoints.iter().all(|setpoint| setpoint.flags & home == 0), "{setpoints:?}");
+    assert_looks(&world, -30.0, 20.0);
+}
+
+/// A gimbal that is told to stay retracted keeps its motors off, and whoever asks for them is told that they are.
+#[test]
+fn retract_keeps_them_off() {
+    let (mut world, places) =
+        running_with(device(Generation::V2), GremsySettings { retract_allowed: true, ..GremsySettings::default() });
+    take_control(&mut world);
+    let retract = OperationId(1_000 + world.answers.len() as u64);
+    world.input(Input::Asked { id: retract, gimbal: "camera", asked: &Asked::Retract });
+    run(&mut world, places, 2 * SECOND);
+
+    let id = ask_for(&mut world, places, Motors::On, 8 * SECOND);
+
+    assert_eq!(seen(&world).details.motors_on, Some(false));
+    let answer = answer_of(&world, id);
+    assert!(matches!(answer, Some(Err(NotDone::Operation(OperationError::NoEffect(_))))), "{answer:?}");
+}
