@@ -18,6 +18,7 @@ pub mod voice;
 mod autopilot_client;
 mod commands;
 mod device;
+mod given;
 mod heading;
 mod inquiries;
 mod mount;
@@ -120,6 +121,10 @@ pub enum ManagerOutput {
         id: OperationId,
         operation: Operation,
     },
+    /// To be told back when the driver has been given the operation and what it says to that was heard.
+    Given {
+        id: OperationId,
+    },
     /// The autopilot is to be asked for a message that it may never have sent.
     AskAutopilot {
         message_id: u32,
@@ -192,6 +197,8 @@ pub struct GimbalManager {
     mount_senders: MountSenders,
     /// Those under way; it is paused while there are any. Few, because few things are done at once.
     pauses: Vec<asked::Pause>,
+    /// Of which the events tell.
+    given: Vec<given::Given>,
     /// Whose commands of which number are being done by the gimbal.
     commanded: Vec<(MavId, u16)>,
     next_command: u64,
@@ -236,6 +243,7 @@ impl GimbalManager {
             autopilot_client: AutopilotClient::default(),
             mount_senders: MountSenders::default(),
             pauses: Vec::new(),
+            given: Vec::new(),
             commanded: Vec::new(),
             next_command: 0,
             rejected: BTreeMap::new(),

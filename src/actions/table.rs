@@ -266,8 +266,12 @@ pub const ACTIONS: &[Action] = &[
         about: "Set the software limits of one axis",
         fields: &[
             AXIS,
-            required(number("min_deg", "the lower one; down and left are negative", 360.0)),
-            required(number("max_deg", "the upper one", 360.0)),
+            required(number(
+                "min_deg",
+                "the lower one; down and left are negative; of tilt and roll -180 to 180",
+                360.0,
+            )),
+            required(number("max_deg", "the upper one; of tilt and roll -180 to 180", 360.0)),
         ],
         word: None,
         read: |values| {

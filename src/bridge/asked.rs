@@ -108,7 +108,7 @@ impl Bridge {
         let Some(entry) = self.asked.take(component, id) else { return };
         let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
         if let Some(gimbal) = self.roster.of_manager(entry.component) {
-            gimbal.manager.handle_operated(now, id, answer.is_ok(), around);
+            gimbal.manager.handle_operated(now, id, &answer, around);
             if let Asker::Command(commander) = entry.asker {
                 gimbal.manager.handle_commanded(commander, &answer);
             }

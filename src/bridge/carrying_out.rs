@@ -118,6 +118,7 @@ impl Bridge {
             ManagerOutput::Operate { id, operation } => {
                 self.roster.get_mut(at).driver.handle_operation(now, id, operation)
             }
+            ManagerOutput::Given { id } => self.roster.get_mut(at).manager.handle_given(id),
             ManagerOutput::AskAutopilot { message_id } => self.ask_autopilot_for(now, component, message_id),
             ManagerOutput::Event(event) => self.handle_event(now, at, event),
         }

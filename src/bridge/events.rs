@@ -101,7 +101,7 @@ impl Bridge {
     /// An event is remembered, and said where the pilot must know it.
     pub(super) fn handle_event(&mut self, now: Timestamp, at: usize, mut event: Event) {
         if let Event::Operated { operation: Operation::SetParameter { name, .. }, before, .. } = &mut event {
-            // It is given on to the driver after this.
+            // The driver was given it, and the gimbal has not answered.
             *before = self.roster.get_mut(at).driver.details(now).parameters.get(name).copied();
         }
         let component = self.roster.get_mut(at).component;

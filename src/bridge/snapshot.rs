@@ -37,7 +37,7 @@ pub struct EventSnapshot {
     pub gimbal: String,
     /// `taken`, `taken_over`, `borrowed`, `restored`, `delegated`, `released`, `cleared`, `lapsed`, `holder_restarted`, `system_gone`,
     /// `refused`, `acquire_war`, `gimbal_found`, `gimbal_back`, `gimbal_lost`, `gimbal_restarted`, `gimbal_ready`, `fault`,
-    /// `operated`, `rates_ended`, `roi_started` or `roi_ended`.
+    /// `operated`, `operation_failed`, `rates_ended`, `roi_started` or `roi_ended`.
     pub what: String,
     /// Of control: `primary` or `secondary`.
     pub place: Option<String>,

@@ -375,6 +375,9 @@ pub enum EncoderUnit {
     Angles,
 }
 
+/// What is said of a gimbal that starts to whoever asks something of it.
+pub const STARTING: &str = "the gimbal is starting; wait until it is ready, some 15 s, and ask again";
+
 /// Why an operation was not done.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum OperationError {
@@ -384,7 +387,7 @@ pub enum OperationError {
     Invalid(String),
     #[error("the gimbal is not there")]
     NotThere,
-    #[error("the gimbal is still starting")]
+    #[error("{}", STARTING)]
     NotReady,
     #[error("the gimbal is busy with what was asked of it before. Try again")]
     Busy,

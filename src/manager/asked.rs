@@ -5,10 +5,9 @@
 //! heard whenever it asks for something.
 
 use super::control::Voice;
-use super::events::Event;
 use super::request::{AxisDemand, Claim, Configure, Demand, DemandKind, Refusal};
 use super::roi::{Datum, position};
-use super::{DeviceState, GimbalManager, ManagerOutput, Surroundings, control};
+use super::{DeviceState, GimbalManager, Surroundings, control};
 use crate::geometry::{AngularRate, YawFrame};
 use crate::gimbals::operation::{Motors, Operation, OperationError, OperationId, Restart};
 use crate::timestamp::Timestamp;
@@ -254,7 +253,6 @@ impl GimbalManager {
         }
         if operation.needs_control() {
             self.last_command = None;
-            self.tell(Event::Operated { who, operation: operation.clone(), before: None });
         }
         if operation.ends_demand() {
             self.note_obeyed(now, who);
@@ -263,16 +261,17 @@ impl GimbalManager {
             }
             self.pauses.push(Pause { id, hands_over: *operation == Operation::RadioControl });
         }
-        self.outputs.push_back(ManagerOutput::Operate { id, operation: operation.clone() });
+        self.give(who, id, operation);
         Ok(Progress::UnderWay)
     }
 
     /// What became of an operation. One that was done has taken the place of what the gimbal was told before; after those
     /// that were not it goes on with that.
-    pub fn handle_operated(&mut self, now: Timestamp, id: OperationId, is_done: bool, around: Surroundings<'_>) {
+    pub fn handle_operated(&mut self, now: Timestamp, id: OperationId, answer: &Answer, around: Surroundings<'_>) {
+        self.tell_outcome(id, answer);
         let Some(at) = self.pauses.iter().position(|pause| pause.id == id) else { return };
         let pause = self.pauses.swap_remove(at);
-        match (is_done, pause.hands_over) {
+        match (answer.is_ok(), pause.hands_over) {
             (true, true) => self.tracking.leave_to_radio_control(),
             (true, false) => self.tracking.forget(),
             (false, _) => {}

@@ -1,7 +1,7 @@
 //! What happened around a gimbal, as far as a person may want to know it.
 
 use super::control::{Change, How, Place};
-use crate::gimbals::operation::Operation;
+use crate::gimbals::operation::{Operation, OperationError, STARTING};
 use crate::wire::MavId;
 
 /// Something that happened around one gimbal.
@@ -54,6 +54,12 @@ pub enum Event {
         who: MavId,
         operation: Operation,
         before: Option<f64>,
+    },
+    /// What was asked of the gimbal, and given on to it, was not done.
+    NotOperated {
+        who: MavId,
+        operation: Operation,
+        error: OperationError,
     },
     /// A rotation was stopped because nobody asked for it any more.
     RatesEnded {
@@ -131,6 +137,7 @@ impl Event {
             Self::Ready { .. } => "gimbal_ready",
             Self::Fault { .. } => "fault",
             Self::Operated { .. } => "operated",
+            Self::NotOperated { .. } => "operation_failed",
             Self::RatesEnded { .. } => "rates_ended",
             Self::RoiStarted { .. } => "roi_started",
             Self::RoiEnded { .. } => "roi_ended",
@@ -143,6 +150,7 @@ impl Event {
             Self::Control(Change { who, .. })
             | Self::Refused { who, .. }
             | Self::Operated { who, .. }
+            | Self::NotOperated { who, .. }
             | Self::Doubtful { who, .. }
             | Self::RatesEnded { who, .. } => Some(who),
             Self::AcquireWar { holder, .. } => Some(holder),
@@ -184,7 +192,7 @@ impl Event {
         match *self {
             Self::Refused { reason, .. } => Some(reason),
             Self::Fault { what } => Some(what),
-            Self::Operated { ref operation, .. } => Some(operation.name()),
+            Self::Operated { ref operation, .. } | Self::NotOperated { ref operation, .. } => Some(operation.name()),
             Self::Doubtful { doubt, .. } => Some(doubt.name()),
             Self::RatesEnded { end: RatesEnd::TimedOut, .. } => Some("timed_out"),
             Self::RatesEnded { end: RatesEnd::SenderSilent, .. } => Some("sender_silent"),
@@ -211,12 +219,15 @@ impl Event {
             Self::Found { device } => format!("gimbal found as {device}"),
             Self::Back { device } => format!("gimbal {device} is back"),
             Self::Lost { .. } => "gimbal lost".to_owned(),
-            Self::Restarted { .. } => "gimbal restarted; it holds still until somebody asks".to_owned(),
+            Self::Restarted { .. } => "gimbal restarted; it is told nothing until somebody asks".to_owned(),
             Self::Ready { .. } => "gimbal ready: it can be steered".to_owned(),
             Self::Fault { what } => format!("fault: {what}"),
             Self::Operated { who, ref operation, before } => {
                 let before = before.map(|before| format!(" (it was {before})")).unwrap_or_default();
                 format!("{} asked for {}{before}", names.of(who), operation.describe())
+            }
+            Self::NotOperated { who, ref operation, ref error } => {
+                format!("{}, which {} asked for, was not done: {error}", operation.describe(), names.of(who))
             }
             Self::RatesEnded { who, end: RatesEnd::TimedOut } => {
                 format!("rotation stopped: {} did not ask for it again", names.of(who))
@@ -273,7 +284,7 @@ fn explain(reason: &str) -> String {
         "unknown_gimbal" => "it named a gimbal that is not here",
         "no_gimbal_yet" => "no gimbal was heard yet",
         "gimbal_unknown_yet" => "the gimbal is heard, and has not told yet what it is",
-        "gimbal_starting" => "the gimbal is starting; wait until it is ready, some 15 s, and ask again",
+        "gimbal_starting" => STARTING,
         "no_attitude" => "the attitude of the gimbal is not known",
         "no_heading" => "the heading of the vehicle is not known",
         "no_home_position" => "the autopilot has not told where home is; it is asked",
@@ -327,6 +338,7 @@ mod tests {
         let change = |how, who, from, to| Event::Control(Change { place: Place::Primary, how, who, from, to });
         let operated = |operation, before| Event::Operated { who: MavId::new(1, 191), operation, before };
         let set = |name: &str, value| Operation::SetParameter { name: name.to_owned(), value };
+        let denied = |operation| Event::NotOperated { who: script, operation, error: OperationError::Denied };
         for (event, text) in [
             (change(How::TakenOver, script, Some(gcs), Some(script)), "245/191 took control from 255/190"),
             (change(How::TakenOver, script, Some(gcs), Some(autopilot)), "245/191 took control from 255/190 for 1/1"),
@@ -348,6 +360,10 @@ mod tests {
             (operated(Operation::Motors(Motors::Off), None), "http asked for motors off"),
             (operated(set("PWR_PAN", 60.0), Some(55.0)), "http asked for parameter PWR_PAN = 60 (it was 55)"),
             (operated(set("PWR_PAN", 0.5), None), "http asked for parameter PWR_PAN = 0.5"),
+            (
+                denied(Operation::Motors(Motors::Off)),
+                "motors off, which 245/191 asked for, was not done: the gimbal denied it",
+            ),
             (
                 Event::Refused { who: MavId::new(1, 191), reason: "not_in_control", holder: Some(gcs) },
                 "http was refused: 255/190 is in control",

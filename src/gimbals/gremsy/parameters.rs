@@ -162,6 +162,8 @@ pub enum ParameterError {
     Missing(Parameter),
     #[error("the {parameter} is to be from {} to {}, not {value}", .parameter.range().start(), .parameter.range().end())]
     OutOfRange { parameter: Parameter, value: i32 },
+    #[error("{field} of the {} axis is to be from {} to {}, not {value}", .axis.name(), Parameter::LimitMin(*.axis).range().start(), Parameter::LimitMin(*.axis).range().end())]
+    Limit { axis: Axis, field: &'static str, value: i16 },
     #[error("{0} shares a parameter with other settings, and that has not been read yet")]
     Unread(Parameter),
     #[error("the smaller limit ({min}) is above the larger ({max})")]

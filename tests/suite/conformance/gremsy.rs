@@ -11,6 +11,7 @@ mod restarting;
 mod start_up;
 mod steering;
 mod stopping;
+mod told;
 mod vendor_commands;
 
 use std::time::Duration;

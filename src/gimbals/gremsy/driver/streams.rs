@@ -61,6 +61,9 @@ impl Streams {
     pub fn choose(&mut self, stream: Stream, rate: StreamRate) {
         self.chosen.insert(stream, rate);
         self.wanted.insert(stream, rate);
+        if rate == StreamRate::Off {
+            self.heard.remove(&stream);
+        }
     }
 
     /// The commands that set all of them.

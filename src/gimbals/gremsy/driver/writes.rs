@@ -52,9 +52,10 @@ fn not_empty(writes: Vec<ParameterWrite>) -> Result<Vec<ParameterWrite>, Operati
 fn refused(error: ParameterError) -> OperationError {
     match error {
         ParameterError::Unread(_) => OperationError::NotReady,
-        ParameterError::Missing(_) | ParameterError::OutOfRange { .. } | ParameterError::Crossed { .. } => {
-            OperationError::Invalid(error.to_string())
-        }
+        ParameterError::Missing(_)
+        | ParameterError::OutOfRange { .. }
+        | ParameterError::Limit { .. }
+        | ParameterError::Crossed { .. } => OperationError::Invalid(error.to_string()),
     }
 }
 

@@ -55,6 +55,13 @@ impl AngleLimits {
         if min > max {
             return Err(ParameterError::Crossed { min, max });
         }
+        // Named as it was given, not as the gimbal counts it.
+        let range = Parameter::LimitMin(axis).range();
+        if let Some((field, value)) =
+            [("min_deg", min), ("max_deg", max)].into_iter().find(|(_, value)| !range.contains(value))
+        {
+            return Err(ParameterError::Limit { axis, field, value });
+        }
         let stored = self.turned(axis, tilt);
         Ok([
             write(table, Parameter::LimitMin(axis), stored.min_deg)?,
@@ -136,7 +143,7 @@ mod tests {
         assert_eq!(limits.writes(ParameterTable::New, TiltSense::DownPositive, Axis::Tilt), Err(crossed));
 
         let limits = AngleLimits { min_deg: i16::MIN, max_deg: 0 };
-        let far = ParameterError::OutOfRange { parameter: Parameter::LimitMax(Axis::Tilt), value: 32_767 };
+        let far = ParameterError::Limit { axis: Axis::Tilt, field: "min_deg", value: i16::MIN };
         assert_eq!(limits.writes(ParameterTable::New, TiltSense::DownPositive, Axis::Tilt), Err(far));
 
         let half = |name: &str| (name == "RC_LIM_MIN_PAN").then_some(-90);

@@ -292,7 +292,8 @@ fn what_is_dangerous_is_for_the_holder_only() {
         let unsupported = Err(NotDone::Operation(OperationError::Unsupported));
         assert_eq!(ask(&mut world, &asked), unsupported, "it reaches the driver");
     }
-    assert_eq!(world.snapshot().events[0].text, "http asked for shutdown");
+    // A gimbal that has no such function was asked for nothing.
+    assert_eq!(world.snapshot().events[0].text, "http took control");
 }
 
 /// An operation that a gimbal has not done leaves it to what it was told before.
