@@ -66,8 +66,10 @@ impl EffectWatch {
 
     /// Where it looks; at a limit it is as near as it can be.
     pub fn handle_report(&mut self, now: Timestamp, pose: Pose, at_limit: bool) -> Option<Finding> {
+        // What is measured from something else than before begins anew.
         let still = self.rests.is_some_and(|(_, rest)| {
-            (rest.pitch - pose.pitch).abs() <= STILL && yaw_apart(rest.yaw, pose.yaw).is_none_or(|apart| apart <= STILL)
+            (rest.pitch - pose.pitch).abs() <= STILL
+                && yaw_apart(rest.yaw, pose.yaw).is_some_and(|apart| apart <= STILL)
         });
         if !still {
             self.rests = Some((now, pose));
@@ -155,6 +157,26 @@ mod tests {
         }
         let turning = |millis: u64| pose(0.0, 0.002 * millis as f64);
         assert_eq!(watch(pose(-60.0, 0.0), turning, false), [], "it is on its way");
+    }
+
+    /// In lock mode the yaw is told from North: one that rested before is not at rest because it is measured otherwise.
+    #[test]
+    fn one_that_turns_after_a_change_of_its_mode_works() {
+        let north = |degrees| Pose { yaw: Yaw::InEarthFrame(Angle::from_degrees(degrees)), ..pose(0.0, 0.0) };
+        let mut watch = EffectWatch::default();
+        watch.handle_report(Timestamp::ZERO, pose(0.0, 0.0), false);
+        watch.handle_target(Some(north(160.0)));
+        let found: Vec<Finding> = (50..7_000)
+            .step_by(50)
+            .filter_map(|millis| {
+                watch.handle_report(Timestamp::from_millis(millis), north(0.02 * millis as f64), false)
+            })
+            .collect();
+        assert_eq!(found, [], "at 140 degrees of 160 it is on its way");
+        let stuck = (7_000..11_000)
+            .step_by(50)
+            .find_map(|millis| watch.handle_report(Timestamp::from_millis(millis), north(140.0), false));
+        assert_eq!(stuck, Some(Finding::NoEffect));
     }
 
     /// "MOUNT_ORIENTATION pitch seen inverted with Gremsy" (mavros pull request 1744).
