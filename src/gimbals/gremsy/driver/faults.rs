@@ -21,8 +21,10 @@ pub enum Fault {
     NoAnswers,
     /// It was told to move while its motors are off.
     MotorsOff,
-    /// They were switched off by "retract", and do not come back.
+    /// They were switched off, by "retract" or by name, and do not come back.
     StaysRetracted,
+    /// It is configured as a v2 gimbal, and does not tell where it looks as one does.
+    NoAttitude,
     /// It does not change between lock and follow.
     ModeRefused,
     /// It answers nothing about parameters.
@@ -50,6 +52,7 @@ impl Fault {
             Self::NoAnswers => "does not answer commands",
             Self::MotorsOff => "motors are off",
             Self::StaysRetracted => "motors stay off, restart it",
+            Self::NoAttitude => "sends no attitude (gremsy_generation)",
             Self::ModeRefused => "refuses lock or follow",
             Self::NoParameters => "answers no parameters",
             Self::NoStatus => "does not tell its status",
@@ -92,8 +95,12 @@ impl fmt::Display for Fault {
             ),
             Self::MotorsOff => f.write_str("it was told to move while its motors are off. Switch them on"),
             Self::StaysRetracted => f.write_str(
-                "its motors were switched off by \"retract\" and do not come back: this firmware needs a restart. Restart the \
-                 gimbal, and leave retract_allowed off",
+                "its motors were switched off and do not come back: this firmware needs a restart. Restart the gimbal, and \
+                 neither switch its motors off nor set retract_allowed",
+            ),
+            Self::NoAttitude => f.write_str(
+                "it sends no GIMBAL_DEVICE_ATTITUDE_STATUS, as a v2 gimbal does, so it is not known where it looks. Leave \
+                 gremsy_generation out to have it found out",
             ),
             Self::ModeRefused => f.write_str(
                 "it refuses to change between lock and follow, so it is not told where to look. Check that the radio type is \
@@ -192,6 +199,7 @@ mod tests {
             Fault::NoAnswers,
             Fault::MotorsOff,
             Fault::StaysRetracted,
+            Fault::NoAttitude,
             Fault::ModeRefused,
             Fault::NoParameters,
             Fault::NoStatus,

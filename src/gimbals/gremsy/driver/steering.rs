@@ -13,12 +13,15 @@ use crate::gimbals::gremsy::modes::{self, ControlMode};
 use crate::gimbals::gremsy::packet;
 use crate::gimbals::gremsy::status::OperationState;
 use crate::gimbals::operation::{OperationError, YawMode};
-use crate::gimbals::report::Readiness;
+use crate::gimbals::report::{GimbalStatus, Readiness};
 use crate::gimbals::setpoint::{Pointing, RadioControl, Setpoint, Stabilised, Turning};
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 use crate::wire::dialect::{COMMAND_LONG_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA, MavMessage};
 use crate::wire::ids::GimbalFlags;
+
+/// Its flags come twenty times a second; older ones say nothing of what it was told since.
+const SHOWN_WITHIN: std::time::Duration = std::time::Duration::from_millis(400);
 
 /// Closer to where it was told to look it is there.
 const THERE: Angle = Angle::from_degrees(1.0);
@@ -53,7 +56,8 @@ impl GremsyDriver {
         let is_off = self.heard.status.is_some_and(|(_, status)| status.operation() == OperationState::OFF);
         let is_retracted = self.is_retracted || self.mode_change.is_some() || self.mount.is_retracted();
         let may_start = self.motors_asked.is_some_and(|at| now.since(at) < MOTORS_SHOW_WITHIN);
-        if self.is_present && is_off && !is_retracted && !is_stop && !may_start {
+        let stay_off = self.faults.iter().any(|fault| *fault == Fault::StaysRetracted);
+        if self.is_present && is_off && !is_retracted && !is_stop && !may_start && !stay_off {
             self.raise(Fault::MotorsOff);
         }
     }
@@ -232,12 +236,30 @@ impl GremsyDriver {
                 let mode = self.mode_change.take().map(|change| change.mode());
                 match (asker, mode) {
                     (Some(id), Some(mode)) if result.is_ok() => self.handle_mode_taken(now, id, mode),
+                    (Some(id), Some(ControlMode::Reset)) if self.shows_retracted(now) => {
+                        self.raise_stays_off();
+                        let text = "its motors stay off; this firmware needs a restart for that";
+                        self.operated(id, Err(OperationError::NoEffect(text.to_owned())));
+                    }
                     (Some(id), _) => self.operated(id, result),
-                    (None, _) if result.is_err() => self.raise(Fault::StaysRetracted),
+                    (None, _) if result.is_err() => self.raise_stays_off(),
                     (None, _) => {}
                 }
             }
         }
+    }
+
+    fn shows_retracted(&self, now: Timestamp) -> bool {
+        let is_shown = |(at, status): (Timestamp, GimbalStatus)| {
+            now.since(at) < SHOWN_WITHIN && status.flags.contains(GimbalFlags::RETRACT)
+        };
+        self.heard.attitude.is_some_and(is_shown)
+    }
+
+    /// To switch them on is no remedy.
+    fn raise_stays_off(&mut self) {
+        self.faults.clear(|fault| *fault == Fault::MotorsOff);
+        self.raise(Fault::StaysRetracted);
     }
 
     /// Something else than its setpoint was asked of it.
@@ -277,7 +299,7 @@ impl GremsyDriver {
                 }
                 MountOutput::ModeRefused => self.raise(Fault::ModeRefused),
                 MountOutput::ModeTaken => self.faults.clear(|fault| *fault == Fault::ModeRefused),
-                MountOutput::StaysRetracted => self.raise(Fault::StaysRetracted),
+                MountOutput::StaysRetracted => self.raise_stays_off(),
             }
         }
     }

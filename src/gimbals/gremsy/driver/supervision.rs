@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::faults::Fault;
-use super::{GremsyDriver, Heard, LOST_AFTER, TICK, Timer, operations};
+use super::{Generation, GremsyDriver, Heard, LOST_AFTER, TICK, Timer, operations};
 use crate::gimbals::driver::DriverOutput;
 use crate::gimbals::gremsy::status::{Activity, SystemStatus};
 use crate::gimbals::operation::OperationError;
@@ -204,6 +204,10 @@ impl GremsyDriver {
                 self.raise(Fault::NotAligned(status.alignment));
             }
             _ => {}
+        }
+        let is_v2 = self.settings.generation == Some(Generation::V2);
+        if is_v2 && waited >= READY_WITHIN && self.heard.device_status.is_none() {
+            self.raise(Fault::NoAttitude);
         }
         if self.mount.is_unanswered(now) {
             self.raise(Fault::NoAnswers);

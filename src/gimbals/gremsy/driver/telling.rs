@@ -66,6 +66,7 @@ impl GremsyDriver {
     /// `GIMBAL_DEVICE_ATTITUDE_STATUS`: the attitude in v2.
     pub(super) fn handle_device_status(&mut self, now: Timestamp, status: GimbalStatus) {
         self.heard.device_status = Some(now);
+        self.faults.clear(|fault| *fault == Fault::NoAttitude);
         self.search.handle_attitude_status();
         if self.search.decided() != Some(Generation::V2) {
             return;

@@ -1,6 +1,8 @@
 //! Known faults of gimbals and their firmware: recognised, named, and worked round where that can be done.
 
 use gimbald::gimbals::gremsy::parameters::RcType;
+use gimbald::gimbals::operation::{Motors, OperationError};
+use gimbald::manager::asked::NotDone;
 use gimbald::wire::dialect::{MavMessage, PARAM_REQUEST_LIST_DATA, STATUSTEXT_DATA};
 use gimbald::wire::ids::message;
 
@@ -254,4 +256,65 @@ fn a_family_that_does_not_fit_is_named() {
     world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_INFORMATION(information));
     let other = "made it, but its family is gremsy. Is family right? Leave the key out to have it found out";
     assert!(faults(&world).iter().any(|fault| fault.contains(other)), "{:?}", faults(&world));
+}
+
+/// "If the commanded pose differs by > 10° from the report for > 3 s with rate < 1 °/s" (gimbals 1.10): one that is on its
+/// way moves, whatever its yaw is told from. Locked, it tells yaw from North, and from the nose before.
+#[test]
+fn a_gimbal_on_its_way_to_a_yaw_from_north_has_no_fault() {
+    for generation in [Generation::V1, Generation::V2] {
+        for turn in [160.0, -120.0] {
+            let (mut world, places) = running(generation);
+            take_control(&mut world);
+            assert_eq!(operate(&mut world, places, Operation::SetCombinedAttitude(true)), Some(Ok(())));
+            let vehicle = world.snapshot().vehicle.heading_deg.expect("a heading");
+            let asked = Asked::Point {
+                roll: AxisDemand::default(),
+                pitch: AxisDemand::default(),
+                yaw: AxisDemand { angle: Some(Angle::from_degrees(vehicle + turn)), rate: None },
+                yaw_frame: YawFrame::Earth,
+            };
+            assert_eq!(ask(&mut world, places, &asked), Some(Ok(())));
+            run(&mut world, places, 4 * SECOND);
+            assert_eq!((faults(&world), texts(&world, places)), (vec![], vec![]), "{generation:?} {turn}");
+        }
+    }
+}
+
+/// "On some firmware only a reboot re-enables": also where it was "motors off" that cut them, which is RETRACT in v2. Whoever
+/// switches them on is told so, and nothing that contradicts it.
+#[test]
+fn motors_that_stay_off_are_named_whoever_switched_them_off() {
+    let latched = DeviceSettings { is_latched_by_retract: true, ..device(Generation::V2) };
+    let (mut world, places) = running_with(latched, GremsySettings::default());
+    take_control(&mut world);
+    assert_eq!(operate(&mut world, places, Operation::Motors(Motors::Off)), Some(Ok(())));
+    let text = "its motors stay off; this firmware needs a restart for that";
+    let expected = Err(NotDone::Operation(OperationError::NoEffect(text.to_owned())));
+    assert_eq!(operate(&mut world, places, Operation::Motors(Motors::On)), Some(expected));
+    let fault = "its motors were switched off and do not come back: this firmware needs a restart. Restart the gimbal, and \
+                 neither switch its motors off nor set retract_allowed";
+    assert_eq!(faults(&world), [fault]);
+    point(&mut world, -30.0, 20.0);
+    run(&mut world, places, 5 * SECOND);
+    assert_eq!(faults(&world), [fault]);
+    assert_eq!(texts(&world, places), ["camera: motors stay off, restart it"]);
+}
+
+/// `gremsy_generation` is "for when it is found out wrong": where it is wrong itself, it is named.
+#[test]
+fn a_generation_that_is_set_wrong_is_named() {
+    let wrong = GremsySettings { generation: Some(V2), ..GremsySettings::default() };
+    let (mut world, places) = switched_on(device(Generation::V1), wrong);
+    run(&mut world, places, 30 * SECOND);
+    assert_eq!(
+        faults(&world),
+        ["it sends no GIMBAL_DEVICE_ATTITUDE_STATUS, as a v2 gimbal does, so it is not known where it looks. Leave \
+             gremsy_generation out to have it found out"]
+    );
+    assert_eq!(texts(&world, places), ["camera: sends no attitude (gremsy_generation)"]);
+    let right = GremsySettings { generation: Some(V2), ..GremsySettings::default() };
+    let (mut world, places) = switched_on(device(Generation::V2), right);
+    run(&mut world, places, 30 * SECOND);
+    assert_eq!((faults(&world), texts(&world, places)), (vec![], vec![]));
 }
