@@ -3,13 +3,17 @@
 use gimbald::gimbals::operation::{Motors, OperationError};
 use gimbald::manager::asked::NotDone;
 
+use gimbald::wire::dialect::COMMAND_ACK_DATA;
+
 use super::*;
+use crate::support::script::{ACCEPTED, of};
 
 const FAULT: &str = "it was told to move while its motors are off. Switch them on";
 
 /// Asks for motors, and lets so much time pass.
 fn ask_for(world: &mut World, places: Places, motors: Motors, duration: Duration) -> OperationId {
-    let id = OperationId(1_000 + world.answers.len() as u64);
+    // What is asked before it is answered has another one.
+    let id = OperationId(50_000 + world.answers.len() as u64);
     let asked = Asked::Operation(Operation::Motors(motors));
     world.input(Input::Asked { id, gimbal: "camera", asked: &asked });
     run(world, places, duration);
@@ -42,6 +46,32 @@ fn the_remedy_for_motors_that_are_off_helps() {
     }
 }
 
+/// The same by `USER_1` (31010), "answered IN_PROGRESS at once and with the result when the gimbal has done them".
+#[test]
+fn the_remedy_by_command_helps_as_well() {
+    for generation in [Generation::V1, Generation::V2] {
+        for after in [300, 310, 325, 340] {
+            let (mut world, places) = running(generation);
+            take_control(&mut world);
+            assert_eq!(operate(&mut world, places, Operation::Motors(Motors::Off)), Some(Ok(())));
+            world.input(Input::Asked { id: OperationId(7), gimbal: "camera", asked: &Asked::ReleaseControl });
+            demand(&mut world, places, [-30.0, 20.0, f32::NAN, f32::NAN, 0.0]);
+            run(&mut world, places, Duration::from_millis(after));
+            world.take(places.ground);
+
+            let on = command_long(MANAGER, command::USER_1, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+            world.send(places.ground, GCS, &on);
+            run(&mut world, places, 8 * SECOND);
+
+            let acks: Vec<COMMAND_ACK_DATA> = of(&world.take(places.ground));
+            let results: Vec<u8> =
+                acks.into_iter().filter(|ack| ack.command == command::USER_1).map(|ack| ack.result).collect();
+            assert_eq!(results, [5, ACCEPTED], "{generation:?} {after}");
+            assert_looks(&world, -30.0, 20.0);
+        }
+    }
+}
+
 /// A new demand while they start is obeyed when they run, and is no reason for not switching them on.
 #[test]
 fn a_demand_while_they_start_waits_for_them() {
@@ -53,6 +83,7 @@ fn a_demand_while_they_start_waits_for_them() {
             assert_eq!(operate(&mut world, places, Operation::Motors(Motors::Off)), Some(Ok(())));
             run(&mut world, places, Duration::from_millis(before));
             let id = ask_for(&mut world, places, Motors::On, Duration::ZERO);
+            assert_eq!(answer_of(&world, id), None, "{generation:?} {before}");
             point(&mut world, -20.0, 10.0);
             run(&mut world, places, 8 * SECOND);
             assert_eq!(answer_of(&world, id), Some(Ok(())), "{generation:?} {before}");
