@@ -4,9 +4,10 @@
 //! A line is kept of each for the next start, its fields between tabs: the name, which device it was, and the family whose
 //! words stop it where only we know. A name without a device, of
 //! a gimbal that was not heard, or of an older version, means whoever has that name; a device is stopped whatever it is
-//! called by then.
+//! called by then, and when it is not heard, who has its name.
 
 use std::fmt;
+use std::time::Duration;
 
 use super::{Gimbal, Roster};
 use crate::gimbals::settings::Family;
@@ -17,6 +18,9 @@ const BETWEEN_FIELDS: char = '\t';
 
 /// So many are waited for at most; there is room for fewer gimbals.
 const MAX_LEFT: usize = 64;
+
+/// One that was left turning and is not heard for so long while another has its name may be that one.
+const RENAMED_AFTER: Duration = Duration::from_secs(5);
 
 /// A gimbal that may be turning.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -119,6 +123,11 @@ impl Gimbal {
         }
         self.manager.stop_when_heard();
     }
+
+    /// To a plain v1 gimbal the word that stops a Gremsy is an angle: only who is known to be one is told it for another.
+    fn may_be_stopped_as(&self, family: Option<Family>) -> bool {
+        family.is_none_or(|family| self.driver.family() == family)
+    }
 }
 
 impl Roster {
@@ -165,7 +174,8 @@ impl Roster {
             }
             let (device, link, heard, stops_as) = (former.adopted, former.link, former.heard, former.driver.stops_as());
             for gimbal in &mut self.gimbals {
-                let may_be_it = gimbal.adopted.is_some() && gimbal.link == link && gimbal.adopted_at > heard;
+                let is_successor = gimbal.adopted.is_some() && gimbal.link == link && gimbal.adopted_at > heard;
+                let may_be_it = is_successor && gimbal.may_be_stopped_as(stops_as);
                 if may_be_it && !gimbal.is_lost() && gimbal.stopped_for != device {
                     gimbal.stopped_for = device;
                     if let Some(family) = stops_as {
@@ -173,6 +183,27 @@ impl Roster {
                     }
                     gimbal.manager.stop_unless_steered(now);
                 }
+            }
+        }
+        self.stop_namesakes(now);
+    }
+
+    /// A device that an earlier run left turning, and that is not heard for a while, may be the one that has its name now,
+    /// under another id. It is waited for all the same.
+    fn stop_namesakes(&mut self, now: Timestamp) {
+        for gimbal in &mut self.gimbals {
+            let name = &gimbal.manager.settings().name;
+            let Some(left) = self.left_turning.iter().find(|left| left.name == *name && left.device.is_some()) else {
+                continue;
+            };
+            let is_there =
+                gimbal.adopted.is_some() && !gimbal.is_lost() && now.since(gimbal.adopted_at) >= RENAMED_AFTER;
+            if is_there && gimbal.stopped_for != left.device && gimbal.may_be_stopped_as(left.stops_as) {
+                gimbal.stopped_for = left.device;
+                if let Some(family) = left.stops_as {
+                    gimbal.driver.stop_as(family);
+                }
+                gimbal.manager.stop_unless_steered(now);
             }
         }
     }

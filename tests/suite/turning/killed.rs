@@ -63,6 +63,24 @@ fn the_device_that_turned_is_stopped_whatever_it_is_called_now() {
     }
 }
 
+/// And who has its name now, when the device that turned is not heard: it may be that one under another id.
+#[test]
+fn one_that_has_another_id_at_the_next_start_is_stopped() {
+    for kind in KINDS {
+        for id in [MavId::new(1, 171), MavId::new(7, 154)] {
+            let settings = Settings { gimbals: vec![GimbalSettings::found("camera".to_owned())], ..three_links() };
+            let mut flight = Flight::turning_with(kind, settings.clone());
+            flight.world.kill();
+            flight.cable.rename(id);
+            flight.run_for(SECOND / 2);
+            let left_turning = flight.world.stored_turning.clone();
+            flight.world.start(Settings { left_turning, ..settings });
+            flight.run_for(20 * SECOND);
+            flight.assert_rests(&format!("{kind:?} {id}"));
+        }
+    }
+}
+
 /// "Kept until they have been told to stop": also one that was not heard in the life between, however that ended.
 #[test]
 fn who_is_waited_for_is_kept_for_the_next_start_too() {

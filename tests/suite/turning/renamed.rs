@@ -1,6 +1,8 @@
 //! Its MAVLink id becomes another while it turns.
 
+use gimbald::gimbals::mavlink_v1::sim as mavlink_v1;
 use gimbald::gimbals::settings::GimbalSettings;
+use gimbald::wire::dialect::COMMAND_LONG_DATA;
 
 use super::*;
 
@@ -49,4 +51,27 @@ fn a_gimbal_that_was_there_before_is_told_nothing() {
     let gimbals = flight.world.snapshot().gimbals;
     let other = gimbals.iter().find(|gimbal| gimbal.name == "gimbal-171").expect("it was found");
     assert_eq!((other.state.as_str(), &other.setpoint), ("alive", &None));
+}
+
+/// "To a plain v1 gimbal its own are angles": one that comes to the link of a Gremsy which fell silent while it turned is told
+/// none of a Gremsy's zeros, which would take it to its middle.
+#[test]
+fn a_v1_gimbal_that_comes_after_a_gremsy_is_not_moved() {
+    let mut flight = Flight::turning(Kind::GremsyV1);
+    flight.cable.cut();
+    flight.run_for(2 * SECOND);
+    let place = flight.world.open(1);
+    let settings = mavlink_v1::DeviceSettings { component_id: 171, ..mavlink_v1::DeviceSettings::default() };
+    let device = mavlink_v1::Device::new(flight.world.now, settings);
+    flight.world.install(place, device);
+    flight.world.forget();
+    flight.run_for(20 * SECOND);
+    let told: Vec<u16> =
+        flight.world.take_messages::<COMMAND_LONG_DATA>(place).iter().map(|told| told.command).collect();
+    assert!(!told.is_empty() && !told.contains(&205), "{told:?}");
+    let gimbals = flight.world.snapshot().gimbals;
+    assert_eq!(
+        gimbals.iter().find(|gimbal| gimbal.name == "gimbal-171").map(|gimbal| gimbal.family.as_str()),
+        Some("mavlink_v1")
+    );
 }

@@ -99,6 +99,9 @@ impl GremsyDriver {
         self.heard.attitude = Some((now, status));
         self.outputs.push_back(DriverOutput::Report(Report::Attitude(status)));
         let pose = Pose { pitch: status.attitude.angles().pitch, yaw: status.attitude.yaw() };
+        if let Some(stopping) = &mut self.stopping {
+            stopping.handle_report(now, pose.pitch, pose.yaw);
+        }
         let limits = FailureFlags::AT_PITCH_LIMIT | FailureFlags::AT_YAW_LIMIT | FailureFlags::AT_ROLL_LIMIT;
         if self.heard.status.is_some_and(|(_, status)| !status.motors_on()) {
             return self.effect.pause();

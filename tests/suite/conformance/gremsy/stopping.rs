@@ -132,6 +132,13 @@ fn what_is_asked_by_name_waits_until_it_has_stopped() {
             deaf.setpoints.set(5);
             assert_eq!(operate(&mut world, places, operation.clone()), Some(Ok(())), "{generation:?} {operation:?}");
             assert_rests(&mut world, places);
+            // What is heard while nothing arrives does not mean that it has stopped: it tells that it turns.
+            let (mut world, places, deaf) = turning_by_name(Generation::V2);
+            deaf.setpoints.set(40);
+            let not_done = operate(&mut world, places, operation.clone());
+            assert!(matches!(not_done, Some(Err(NotDone::Operation(_)))), "{operation:?}: {not_done:?}");
+            run(&mut world, places, 4 * SECOND);
+            assert_rests(&mut world, places);
             // One that hears none of them is not left alone.
             let (mut world, places, deaf) = turning_by_name(Generation::V1);
             deaf.setpoints.set(u32::MAX);
