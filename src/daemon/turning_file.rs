@@ -1,10 +1,15 @@
 //! Which gimbals were told to turn, kept from one start to the next: whoever is killed cannot stop them.
 
-use std::fs;
-use std::io;
-use std::path::PathBuf;
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
 
 const NAME: &str = "turning";
+/// What is written goes here first, so that a process that is killed meanwhile leaves one or the other.
+const NEXT_NAME: &str = "turning.next";
+
+/// More is not read: there is room for fewer gimbals.
+const MAX_BYTES: u64 = 16 * 1024;
 
 /// A file in the runtime directory, a line of each gimbal, which is in memory and outlives a restart; nothing is kept without that
 /// directory. It is written when a rotation starts or ends, on the way to the gimbal, which costs a few dozen microseconds.
@@ -21,7 +26,7 @@ impl TurningFile {
     /// The lines of the gimbals that an earlier run left turning.
     pub fn read(&self) -> Vec<String> {
         let Some(path) = self.path() else { return Vec::new() };
-        match fs::read_to_string(&path) {
+        match read_beginning(&path) {
             Ok(text) => text.lines().filter(|line| !line.is_empty()).map(str::to_owned).collect(),
             Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
             Err(error) => {
@@ -34,7 +39,12 @@ impl TurningFile {
     /// Replaces what was kept.
     pub fn store(&self, lines: &str) {
         let Some(path) = self.path() else { return };
-        let stored = if lines.is_empty() { fs::remove_file(&path) } else { fs::write(&path, lines) };
+        let stored = if lines.is_empty() {
+            fs::remove_file(&path)
+        } else {
+            let next = path.with_file_name(NEXT_NAME);
+            fs::write(&next, lines).and_then(|()| fs::rename(&next, &path))
+        };
         match stored {
             Ok(()) => {}
             Err(error) if lines.is_empty() && error.kind() == io::ErrorKind::NotFound => {}
@@ -45,6 +55,17 @@ impl TurningFile {
     fn path(&self) -> Option<PathBuf> {
         self.directory.as_ref().map(|directory| directory.join(NAME))
     }
+}
+
+/// Whatever stands there: what is no UTF-8 spoils no other line.
+fn read_beginning(path: &Path) -> io::Result<String> {
+    // A pipe in its place would be waited for.
+    if !fs::metadata(path)?.is_file() {
+        return Err(io::Error::other("it is no file; remove it"));
+    }
+    let mut bytes = Vec::new();
+    File::open(path)?.take(MAX_BYTES).read_to_end(&mut bytes)?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
 #[cfg(test)]
@@ -62,6 +83,22 @@ mod tests {
         file.store("");
         assert_eq!(file.read(), Vec::<String>::new());
         assert_eq!(fs::read_dir(directory.path()).expect("it is there").count(), 0);
+    }
+
+    #[test]
+    fn whatever_else_stands_there_spoils_no_line_and_holds_nobody_up() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let file = TurningFile::new(Some(directory.path().to_owned()));
+        let path = directory.path().join(NAME);
+        fs::write(&path, b"\xff\xfe\ncamera\t1/154\n").expect("a writable folder");
+        assert_eq!(file.read()[1..], ["camera\t1/154"]);
+        fs::write(&path, vec![b'\t'; 1_000_000]).expect("a writable folder");
+        assert_eq!(file.read().concat().len(), 16 * 1024);
+        fs::remove_file(&path).expect("it is there");
+        nix::unistd::mkfifo(&path, nix::sys::stat::Mode::S_IRWXU).expect("a folder with room for it");
+        assert_eq!(file.read(), Vec::<String>::new());
+        file.store("camera\n");
+        assert_eq!(file.read(), ["camera"]);
     }
 
     #[test]

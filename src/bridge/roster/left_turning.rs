@@ -42,12 +42,16 @@ impl LeftTurning {
         let mut fields = line.split(BETWEEN_FIELDS);
         let name = fields.next().filter(|name| !name.is_empty())?.to_owned();
         let mut left = Self { name, device: None, stops_as: None };
+        let mut is_understood = true;
         for field in fields {
             match read_id(field) {
                 Some(device) => left.device = Some(device),
                 None if field == Family::Gremsy.name() => left.stops_as = Some(Family::Gremsy),
-                None => tracing::warn!(line, field, "not understood of a gimbal that was left turning"),
+                None => is_understood = false,
             }
+        }
+        if !is_understood {
+            tracing::warn!(gimbal = left.name, "not all is understood of a gimbal that was left turning");
         }
         Some(left)
     }
@@ -86,7 +90,9 @@ pub struct Awaited {
 impl Awaited {
     /// As an earlier run kept them.
     pub fn read(lines: &[String]) -> Self {
-        let gimbals = lines.iter().filter_map(|line| LeftTurning::read(line)).take(MAX_LEFT).collect();
+        // The latest are the last.
+        let lines = &lines[lines.len().saturating_sub(MAX_LEFT)..];
+        let gimbals = lines.iter().filter_map(|line| LeftTurning::read(line)).collect();
         Self { gimbals, revision: 0 }
     }
 

@@ -26,6 +26,13 @@ pub struct Pose {
     pub yaw: Yaw,
 }
 
+impl Pose {
+    /// By no more than one that rests turns.
+    fn is_near(self, other: Self) -> bool {
+        (self.pitch - other.pitch).abs() <= STILL && yaw_apart(self.yaw, other.yaw).is_some_and(|apart| apart <= STILL)
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Finding {
     /// It is where it was told to be.
@@ -58,6 +65,9 @@ impl EffectWatch {
             self.apart_since = None;
             return;
         };
+        if self.target.is_none_or(|target| !target.pose.is_near(pose)) {
+            self.apart_since = None;
+        }
         let kept = self.target.filter(|target| (target.base - pose.pitch).abs() < MOVED);
         let from = self.rests.map(|(_, pose)| pose.pitch);
         let (base, from) = kept.map_or((pose.pitch, from), |target| (target.base, target.from));
@@ -67,11 +77,7 @@ impl EffectWatch {
     /// Where it looks; at a limit it is as near as it can be.
     pub fn handle_report(&mut self, now: Timestamp, pose: Pose, at_limit: bool) -> Option<Finding> {
         // What is measured from something else than before begins anew.
-        let still = self.rests.is_some_and(|(_, rest)| {
-            (rest.pitch - pose.pitch).abs() <= STILL
-                && yaw_apart(rest.yaw, pose.yaw).is_some_and(|apart| apart <= STILL)
-        });
-        if !still {
+        if !self.rests.is_some_and(|(_, rest)| rest.is_near(pose)) {
             self.rests = Some((now, pose));
         }
         let Target { pose: wanted, from, .. } = self.target?;
@@ -93,6 +99,9 @@ impl EffectWatch {
         }
         // Its end stops go with the vehicle: at one of them it is as near to a yaw from North as it can be.
         let may_be_at_end = pitch_apart <= APART && matches!(wanted.yaw, Yaw::InEarthFrame(_));
+        if at_limit {
+            self.apart_since = None;
+        }
         let is_stuck = now.since(since) > APART_FOR && rests_for > APART_FOR && !at_limit && !may_be_at_end;
         is_stuck.then_some(Finding::NoEffect)
     }
@@ -159,6 +168,24 @@ mod tests {
         }
         let turning = |millis: u64| pose(0.0, 0.002 * millis as f64);
         assert_eq!(watch(pose(-60.0, 0.0), turning, false), [], "it is on its way");
+    }
+
+    /// "For > 3 s": since it was told so, and could.
+    #[test]
+    fn one_that_was_at_its_limit_has_time_to_leave_it() {
+        let (limit, home) = (pose(0.0, 60.0), pose(0.0, 0.0));
+        let mut watch = EffectWatch::default();
+        let mut report = |target, millis, at, at_limit| {
+            watch.handle_target(Some(target));
+            watch.handle_report(Timestamp::from_millis(millis), at, at_limit)
+        };
+        for millis in (0..10_000).step_by(50) {
+            assert_eq!(report(pose(0.0, 120.0), millis, limit, true), None);
+        }
+        for millis in (10_000..13_000).step_by(50) {
+            assert_eq!(report(home, millis, limit, false), None, "{millis}");
+        }
+        assert_eq!(report(home, 13_100, limit, false), Some(Finding::NoEffect));
     }
 
     /// In lock mode the yaw is told from North: one that rested before is not at rest because it is measured otherwise.
