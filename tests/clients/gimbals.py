@@ -30,11 +30,6 @@ class Gimbal(NamedTuple):
     def device(self):
         return self.ids[1]
 
-    @property
-    def is_component(self):
-        """Whether it is a v2 device, which speaks for itself; its manager speaks for any other."""
-        return self.device > 6
-
     def settings(self):
         """Its entry in the configuration."""
         return f'[[gimbal]]\nname = "camera"\nlink = "gimbal"\nfamily = "{self.family}"\n' if self.family else ""
