@@ -1,5 +1,6 @@
 //! The command line: every command with its arguments and its help.
 
+mod of_family;
 pub mod order;
 mod sim;
 
@@ -7,7 +8,7 @@ use std::ffi::OsString;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::config::{DEFAULT_FILE, settings::HttpSettings};
 use crate::daemon::logging::LogFilter;
@@ -174,12 +175,12 @@ pub struct DemoArgs {
     #[arg(long, value_name = "FAMILY", value_enum, default_value_t = SimulatedFamily::MavlinkV2)]
     pub family: SimulatedFamily,
 
-    #[command(flatten)]
-    pub gremsy: GremsyArgs,
-
     /// End after so many seconds; without it, at Ctrl-C
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(1..))]
     pub duration: Option<u32>,
+
+    #[command(flatten)]
+    pub gremsy: GremsyArgs,
 }
 
 /// Which running daemon is asked.
@@ -245,7 +246,12 @@ impl Cli {
     /// Reads the arguments of a process. When there is nothing to run (help was asked for, or the arguments are
     /// wrong), prints what there is to say and gives the code to end with.
     pub fn read(arguments: impl IntoIterator<Item = OsString>) -> Result<Self, ExitCode> {
-        Self::try_parse_from(arguments).map_err(|error| {
+        let mut command = Self::command();
+        let read = command.try_get_matches_from_mut(arguments).and_then(|matches| {
+            of_family::check(&mut command, &matches)?;
+            Self::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
+        });
+        read.map_err(|error| {
             let code = if error.use_stderr() { ExitCode::Usage } else { ExitCode::Ok };
             // Nobody is left to tell when the terminal is gone.
             let _ = error.print();
@@ -257,7 +263,6 @@ impl Cli {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
 
     fn read(line: &str) -> Result<Cli, ExitCode> {
         Cli::read(line.split(' ').map(OsString::from))
@@ -290,7 +295,9 @@ mod tests {
             ("gimbald sim gimbal --endpoint udpin:127.0.0.1:1 --yaw-range 361", ExitCode::Usage),
             ("gimbald sim gimbal --endpoint udpin:127.0.0.1:1 --family gremsy --gremsy-firmware 7.8", ExitCode::Usage),
             ("gimbald sim gimbal --endpoint udpin:127.0.0.1:1 --family gremsy --gremsy-rc-type radio", ExitCode::Usage),
+            ("gimbald sim gimbal --endpoint udpin:127.0.0.1:1 --gremsy-quiet", ExitCode::Usage),
             ("gimbald demo --duration 0", ExitCode::Usage),
+            ("gimbald demo --family mavlink_v1 --gremsy-generation v1", ExitCode::Usage),
         ] {
             assert_eq!(read(line).map(|_| ()), Err(code), "{line}");
         }

@@ -8,6 +8,9 @@ use crate::gimbals::gremsy::parameters::RcType;
 use crate::gimbals::gremsy::version::FirmwareVersion;
 use crate::sim::faults::WORDS;
 
+const OF_V2: &str = "Options of family mavlink_v2";
+const OF_V1: &str = "Options of family mavlink_v1";
+
 #[derive(Debug, Subcommand)]
 pub enum SimCommand {
     /// A simulated gimbal on an endpoint
@@ -65,11 +68,11 @@ pub struct SimGimbalArgs {
     pub seed: u64,
 
     /// How the gimbal reads the yaw of a setpoint
-    #[arg(long, value_name = "FRAMES", value_enum, default_value_t = SimulatedFrames::Legacy)]
+    #[arg(long, value_name = "FRAMES", value_enum, default_value_t = SimulatedFrames::Legacy, help_heading = OF_V2)]
     pub frames: SimulatedFrames,
 
     /// From where the gimbal counts the yaw that it reports
-    #[arg(long, value_name = "FRAME", value_enum, default_value_t = SimulatedStatusFrame::Earth)]
+    #[arg(long, value_name = "FRAME", value_enum, default_value_t = SimulatedStatusFrame::Earth, help_heading = OF_V2)]
     pub status_frame: SimulatedStatusFrame,
 
     /// How fast the gimbal turns at most, degrees per second; without it 100, and 30 with family gremsy
@@ -80,12 +83,12 @@ pub struct SimGimbalArgs {
     #[arg(long, value_name = "DEG", value_parser = yaw_range)]
     pub yaw_range: Option<f64>,
 
-    /// How a gimbal of family mavlink_v1 says where it looks
-    #[arg(long, value_name = "MESSAGE", value_enum, default_value_t = SimulatedReports::Orientation)]
+    /// How it says where it looks
+    #[arg(long, value_name = "MESSAGE", value_enum, default_value_t = SimulatedReports::Orientation, help_heading = OF_V1)]
     pub v1_reports: SimulatedReports,
 
-    /// A gimbal of family mavlink_v1 counts pitch and yaw the other way round, as ArduPilot does towards a STorM32
-    #[arg(long)]
+    /// It counts pitch and yaw the other way round, as ArduPilot does towards a STorM32
+    #[arg(long, help_heading = OF_V1)]
     pub v1_reversed: bool,
 
     #[command(flatten)]
