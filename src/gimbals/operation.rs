@@ -383,6 +383,9 @@ pub const STARTING: &str = "the gimbal is starting; wait until it is ready, some
 pub enum OperationError {
     #[error("this gimbal has no such function")]
     Unsupported,
+    /// The gimbal may have such a function, and its entry does not say so; with what to do.
+    #[error("{0}")]
+    NotConfigured(&'static str),
     #[error("{0}")]
     Invalid(String),
     #[error("the gimbal is not there")]
@@ -408,8 +411,6 @@ pub enum OperationError {
     /// Answered, and yet it is not so.
     #[error("the gimbal answered, but did not do it: {0}")]
     NoEffect(String),
-    #[error("the configuration does not allow it: {0}")]
-    NotAllowed(&'static str),
 }
 
 /// What became of an operation.

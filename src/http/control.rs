@@ -225,13 +225,13 @@ fn refused(not_done: NotDone) -> Refusal {
         NotDone::Operation(error) => {
             let (status, reason) = match &error {
                 OperationError::Unsupported => (StatusCode::NOT_IMPLEMENTED, "unsupported"),
+                OperationError::NotConfigured(_) => (StatusCode::NOT_IMPLEMENTED, "not_configured"),
                 OperationError::UnsupportedByDevice => (StatusCode::NOT_IMPLEMENTED, "unsupported_by_device"),
                 OperationError::Invalid(_) => (StatusCode::UNPROCESSABLE_ENTITY, "invalid"),
                 OperationError::NotThere => (StatusCode::SERVICE_UNAVAILABLE, "not_there"),
                 OperationError::NotReady => (StatusCode::SERVICE_UNAVAILABLE, "not_ready"),
                 OperationError::Busy => (StatusCode::SERVICE_UNAVAILABLE, "busy"),
                 OperationError::Rejected => (StatusCode::SERVICE_UNAVAILABLE, "rejected"),
-                OperationError::NotAllowed(_) => (StatusCode::FORBIDDEN, "not_allowed"),
                 OperationError::Denied => (StatusCode::BAD_GATEWAY, "denied"),
                 OperationError::Failed => (StatusCode::BAD_GATEWAY, "failed"),
                 OperationError::NoEffect(_) => (StatusCode::BAD_GATEWAY, "no_effect"),

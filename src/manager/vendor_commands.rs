@@ -129,10 +129,10 @@ fn result_of(answer: &Result<(), NotDone>) -> CommandResult {
         Err(NotDone::TooMuch | NotDone::Starting) => CommandResult::TemporarilyRejected,
         Err(NotDone::UnknownGimbal | NotDone::Ending) => CommandResult::Failed,
         Err(NotDone::Operation(error)) => match error {
-            OperationError::Unsupported | OperationError::UnsupportedByDevice => CommandResult::Unsupported,
-            OperationError::Invalid(_) | OperationError::Denied | OperationError::NotAllowed(_) => {
-                CommandResult::Denied
+            OperationError::Unsupported | OperationError::NotConfigured(_) | OperationError::UnsupportedByDevice => {
+                CommandResult::Unsupported
             }
+            OperationError::Invalid(_) | OperationError::Denied => CommandResult::Denied,
             OperationError::NotReady | OperationError::Busy | OperationError::Rejected => {
                 CommandResult::TemporarilyRejected
             }

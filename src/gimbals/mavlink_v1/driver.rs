@@ -43,6 +43,11 @@ const OPEN_LOOP_RATE: AngularRate = AngularRate::from_degrees_per_second(30.0);
 /// A gimbal that sends `SYS_STATUS`, as no plain v1 gimbal is known to, is asked so often whether it is a Gremsy.
 const GREMSY_QUESTIONS: u8 = 3;
 
+/// No v1 gimbal tells whether it has one.
+const NO_RADIO_CONTROL: &str = "v1_radio_control is \"none\", so this gimbal is taken to have no radio control of its own. \
+    If it has one, say in its [[gimbal]] entry how that gets the gimbal: v1_radio_control = \"silence\" (whenever the gimbal is \
+    told nothing) or \"mode\" (by DO_MOUNT_CONTROL in mode 3), and restart gimbald";
+
 /// What is assumed of a v1 gimbal, which cannot say: three axes held to the horizon, yaw against the vehicle.
 fn capabilities(settings: &V1Settings) -> Capabilities {
     let degrees = Angle::from_degrees;
@@ -459,6 +464,7 @@ impl GimbalDriver for MavlinkV1Driver {
                 self.send_when_due(now);
                 Ok(())
             }
+            Operation::RadioControl => Err(OperationError::NotConfigured(NO_RADIO_CONTROL)),
             _ => Err(OperationError::Unsupported),
         };
         self.outputs.push_back(DriverOutput::Operated { id, result });

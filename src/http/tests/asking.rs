@@ -272,6 +272,11 @@ fn what_is_not_done_has_its_status_and_its_reason() {
             json!({"error": "this gimbal has no such function", "reason": "unsupported"}),
         ),
         (
+            NotDone::Operation(OperationError::NotConfigured("set v1_radio_control")),
+            501,
+            json!({"error": "set v1_radio_control", "reason": "not_configured"}),
+        ),
+        (
             NotDone::Operation(OperationError::NotThere),
             503,
             json!({"error": "the gimbal is not there", "reason": "not_there"}),

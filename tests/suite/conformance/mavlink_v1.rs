@@ -303,8 +303,8 @@ fn a_v2_client_hands_a_v1_gimbal_to_its_radio_control() {
     assert!(status.iter().all(|status| status.flags == 44), "{status:?}");
 }
 
-/// "Each reachable three ways": by its name it is handed over as by a client's demand, until the next one, and is not where
-/// it has no radio control.
+/// "Each reachable three ways": by its name it is handed over as by a client's demand, until the next one; where
+/// it is not known to have radio control, "bad input gets a clear error naming the place and the remedy".
 #[test]
 fn a_v1_gimbal_is_left_to_its_radio_control_by_its_name() {
     use gimbald::gimbals::mavlink_v1::config::V1RadioControl;
@@ -320,8 +320,11 @@ fn a_v1_gimbal_is_left_to_its_radio_control_by_its_name() {
     let (mut world, places) = with_gimbal(v1_gimbal());
     assert_eq!(
         asked(&mut world, "radio-control", ""),
-        [Err(NotDone::Operation(OperationError::Unsupported))],
-        "it has none"
+        [Err(NotDone::Operation(OperationError::NotConfigured(
+            "v1_radio_control is \"none\", so this gimbal is taken to have no radio control of its own. If it has one, say in \
+             its [[gimbal]] entry how that gets the gimbal: v1_radio_control = \"silence\" (whenever the gimbal is told nothing) \
+             or \"mode\" (by DO_MOUNT_CONTROL in mode 3), and restart gimbald"
+        )))],
     );
     assert_eq!(told(&mut world, places), [[0.0; 4]; 0]);
 
