@@ -1,6 +1,7 @@
 //! What can be asked of a gimbal by its name: the one table from which the window has its paths, `gimbald gimbal` its
 //! commands, and both what they take.
 
+mod danger;
 mod fields;
 mod table;
 
@@ -8,8 +9,8 @@ use std::fmt;
 
 use serde_json::{Map, Value};
 
-use crate::gimbals::operation::{Motors, Operation, Restart};
 use crate::manager::asked::Asked;
+pub use danger::{Danger, danger_of};
 pub use fields::{Field, Kind, Values, Wrong};
 pub use table::ACTIONS;
 
@@ -24,8 +25,8 @@ pub struct Action {
     pub command: &'static str,
     pub about: &'static str,
     pub fields: &'static [Field],
-    /// The word without which it is not done, where it is dangerous.
-    pub word: Option<&'static str>,
+    /// Where it can cost the camera or the flight.
+    pub danger: Option<&'static Danger>,
     read: fn(&Values) -> Result<Asked, Wrong>,
 }
 
@@ -38,6 +39,11 @@ impl fmt::Debug for Action {
 impl Action {
     pub fn of_command(command: &str) -> Option<&'static Self> {
         ACTIONS.iter().find(|action| action.command == command)
+    }
+
+    /// The word without which it is not done, where it is dangerous.
+    pub fn word(&self) -> Option<&'static str> {
+        self.danger.map(|danger| danger.word)
     }
 
     /// The field that stands in the path.
@@ -61,7 +67,7 @@ impl Action {
         }
         let mut confirmed = None;
         for (name, value) in fields::object(body)? {
-            if name == CONFIRM && self.word.is_some() {
+            if name == CONFIRM && self.danger.is_some() {
                 confirmed = value.as_str().map(str::to_owned);
                 continue;
             }
@@ -74,14 +80,14 @@ impl Action {
             return Err(Wrong::Missing { name: field.name, expected: field.kind.expected() });
         }
         let asked = (self.read)(&values)?;
-        match word_for(&asked) {
-            Some(word) if confirmed.as_deref() != Some(word) => Err(Wrong::Unconfirmed { word }),
+        match danger_of(&asked) {
+            Some(danger) if confirmed.as_deref() != Some(danger.word) => Err(Wrong::Unconfirmed(danger)),
             Some(_) | None => Ok(asked),
         }
     }
 
     fn names_in_body(&self) -> Vec<&'static str> {
-        self.body_fields().map(|field| field.name).chain(self.word.map(|_| CONFIRM)).collect()
+        self.body_fields().map(|field| field.name).chain(self.danger.map(|_| CONFIRM)).collect()
     }
 
     /// The path with `in_path` in its place, percent-encoded.
@@ -90,16 +96,6 @@ impl Action {
             (Some(field), Some(value)) => self.path.replace(&format!("{{{}}}", field.name), &percent_encoded(value)),
             _ => self.path.to_owned(),
         }
-    }
-}
-
-/// The word without which it is not done.
-pub fn word_for(asked: &Asked) -> Option<&'static str> {
-    match asked {
-        Asked::Operation(Operation::Motors(Motors::Off)) => Some("motors off"),
-        Asked::Operation(Operation::Restart(Restart::Reboot)) => Some("reboot"),
-        Asked::Operation(Operation::Restart(Restart::Shutdown)) => Some("shutdown"),
-        _ => None,
     }
 }
 

@@ -6,6 +6,8 @@ use serde::Deserializer;
 use serde::de::{MapAccess, Visitor};
 use serde_json::Value;
 
+use super::danger::Danger;
+
 /// One field.
 pub struct Field {
     pub name: &'static str,
@@ -52,8 +54,8 @@ pub enum Wrong {
     Nothing(Vec<&'static str>),
     #[error("{0}")]
     Together(&'static str),
-    #[error("this is dangerous; it is done when the body says \"confirm\": \"{word}\"")]
-    Unconfirmed { word: &'static str },
+    #[error("this is dangerous: {}; it is done when the body says \"confirm\": \"{}\"", .0.cost, .0.word)]
+    Unconfirmed(&'static Danger),
 }
 
 fn listed(names: &[&str]) -> String {

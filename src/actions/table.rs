@@ -1,5 +1,6 @@
 //! The table itself. Angles in degrees, pitch up and yaw to the right positive.
 
+use super::danger::{MOTORS_OFF, REBOOT, SHUTDOWN};
 use super::Action;
 use super::fields::{Field, Kind, Values, Wrong};
 use crate::geometry::{Angle, AngularRate, AxisLimits, YawFrame};
@@ -31,7 +32,7 @@ pub const ACTIONS: &[Action] = &[
         command: "control",
         about: "Take control of the gimbal, or give it up. Who asks for nothing for lease_timeout_s loses it; taking it again keeps it",
         fields: &[word("action", "what to do", &["take", "release"])],
-        word: None,
+        danger: None,
         read: |values| {
             Ok(if values.word("action") == Some("take") { Asked::TakeControl } else { Asked::ReleaseControl })
         },
@@ -48,7 +49,7 @@ pub const ACTIONS: &[Action] = &[
             positive("pitch_rate_dps", "go there no faster than this", 720.0),
             positive("yaw_rate_dps", "go there no faster than this", 720.0),
         ],
-        word: None,
+        danger: None,
         read: point,
     },
     Action {
@@ -61,7 +62,7 @@ pub const ACTIONS: &[Action] = &[
             number("roll_dps", "degrees per second, right side down is positive", 720.0),
             YAW_FRAME,
         ],
-        word: None,
+        danger: None,
         read: turn,
     },
     plain("stop", "stop", "Stay where it looks at this moment", |_| Ok(Asked::Stop)),
@@ -79,7 +80,7 @@ pub const ACTIONS: &[Action] = &[
             required(number("altitude_m", "above altitude_reference", 100_000.0)),
             optional(word("altitude_reference", "mean sea level (the default), or home", &["amsl", "home"])),
         ],
-        word: None,
+        danger: None,
         read: |values| {
             Ok(Asked::LookAt {
                 latitude_deg: values.number("latitude_deg").unwrap_or_default(),
@@ -98,8 +99,13 @@ pub const ACTIONS: &[Action] = &[
         path: "motors",
         command: "motors",
         about: "Switch the motors; without them the camera falls to where its weight takes it",
-        fields: &[word("state", "off is dangerous", &["on", "off"])],
-        word: Some("motors off"),
+        fields: &[word(
+            "state",
+            "off is dangerous; to a Gremsy that speaks v2 it is RETRACT, and some firmware switches the motors on again only \
+             after a restart",
+            &["on", "off"],
+        )],
+        danger: Some(&MOTORS_OFF),
         read: |values| {
             operation(Operation::Motors(if values.word("state") == Some("off") { Motors::Off } else { Motors::On }))
         },
@@ -109,7 +115,7 @@ pub const ACTIONS: &[Action] = &[
         command: "reboot",
         about: "Start the gimbal again; the camera is not held meanwhile",
         fields: &[],
-        word: Some("reboot"),
+        danger: Some(&REBOOT),
         read: |_| operation(Operation::Restart(Restart::Reboot)),
     },
     Action {
@@ -117,7 +123,7 @@ pub const ACTIONS: &[Action] = &[
         command: "shutdown",
         about: "Shut the gimbal down; it must be switched on by hand",
         fields: &[],
-        word: Some("shutdown"),
+        danger: Some(&SHUTDOWN),
         read: |_| operation(Operation::Restart(Restart::Shutdown)),
     },
     Action {
@@ -125,7 +131,7 @@ pub const ACTIONS: &[Action] = &[
         command: "yaw-mode",
         about: "Use the gimbal's own lock or follow mode, yaw to what it takes for North or to the nose",
         fields: &[word("mode", "which", &["lock", "follow"])],
-        word: None,
+        danger: None,
         read: |values| {
             operation(Operation::SetYawMode(if values.word("mode") == Some("lock") {
                 YawMode::Lock
@@ -150,7 +156,7 @@ pub const ACTIONS: &[Action] = &[
              way; pitch_mapping: straight down as for a survey; axes that are not named stay",
             &RESET_MODES,
         )],
-        word: None,
+        danger: None,
         read: |values| {
             let mode = values.index("mode", &RESET_MODES).map(|at| ResetMode::ALL[at]);
             operation(Operation::Reset(mode.unwrap_or(ResetMode::PitchAndYaw)))
@@ -167,7 +173,7 @@ pub const ACTIONS: &[Action] = &[
         command: "radio-type",
         about: "Say which radio receiver the gimbal has; sync is control by MAVLink",
         fields: &[word("type", "the kind of receiver", &RADIO_TYPES)],
-        word: None,
+        danger: None,
         read: |values| {
             let kind = values.index("type", &RADIO_TYPES).map(|at| RadioType::ALL[at]);
             operation(Operation::SetRadioType(kind.unwrap_or(RadioType::Sync)))
@@ -189,7 +195,7 @@ pub const ACTIONS: &[Action] = &[
                 required: true,
             }),
         ],
-        word: None,
+        danger: None,
         read: |values| {
             let stream = values.index("stream", &STREAMS).map_or(Stream::AttitudeStatus, |at| Stream::ALL[at]);
             let rate = match (values.number("rate_hz"), values.word("rate_hz")) {
@@ -211,7 +217,7 @@ pub const ACTIONS: &[Action] = &[
             Field { name: "parameter", about: "its name", kind: Kind::Name { longest: 16 }, required: true },
             required(number("value", "its new value", 16_777_216.0)),
         ],
-        word: None,
+        danger: None,
         read: |values| {
             let name = values.word("parameter").unwrap_or_default().to_owned();
             operation(Operation::SetParameter { name, value: values.number("value").unwrap_or_default() })
@@ -239,7 +245,7 @@ pub const ACTIONS: &[Action] = &[
                 required: false,
             },
         ],
-        word: None,
+        danger: None,
         read: axis_motion,
     },
     Action {
@@ -257,7 +263,7 @@ pub const ACTIONS: &[Action] = &[
             scale("output_filter", "filter of the output"),
             scale("gain", "gain; only older gimbals have it"),
         ],
-        word: None,
+        danger: None,
         read: motor_control,
     },
     Action {
@@ -273,7 +279,7 @@ pub const ACTIONS: &[Action] = &[
             )),
             required(number("max_deg", "the upper one; of tilt and roll -180 to 180", 360.0)),
         ],
-        word: None,
+        danger: None,
         read: |values| {
             let degrees = |name| Angle::from_degrees(values.number(name).unwrap_or_default());
             let limits = AxisLimits::new(degrees("min_deg"), degrees("max_deg"));
@@ -286,7 +292,7 @@ pub const ACTIONS: &[Action] = &[
         command: "encoder-unit",
         about: "Set what the gimbal's encoder message carries",
         fields: &[word("unit", "65536 counts to the turn, or angles", &["counts", "angles"])],
-        word: None,
+        danger: None,
         read: |values| {
             operation(Operation::SetEncoderUnit(if values.word("unit") == Some("counts") {
                 EncoderUnit::Counts
@@ -322,13 +328,13 @@ const fn plain(
     about: &'static str,
     read: fn(&Values) -> Result<Asked, Wrong>,
 ) -> Action {
-    Action { path, command, about, fields: &[], word: None, read }
+    Action { path, command, about, fields: &[], danger: None, read }
 }
 
 /// One that is on or off.
 const fn switch(path: &'static str, about: &'static str, read: fn(&Values) -> Result<Asked, Wrong>) -> Action {
     const ENABLED: &[Field] = &[Field { name: "enabled", about: "whether it does", kind: Kind::Flag, required: true }];
-    Action { path, command: path, about, fields: ENABLED, word: None, read }
+    Action { path, command: path, about, fields: ENABLED, danger: None, read }
 }
 
 const fn word(name: &'static str, about: &'static str, words: &'static [&'static str]) -> Field {

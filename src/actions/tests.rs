@@ -1,6 +1,6 @@
 use super::*;
 use crate::geometry::{Angle, AngularRate, YawFrame};
-use crate::gimbals::operation::{Axis, AxisMotion, RadioType, ResetMode, Stream, StreamRate};
+use crate::gimbals::operation::{Axis, AxisMotion, Operation, RadioType, ResetMode, Stream, StreamRate};
 use crate::manager::request::AxisDemand;
 
 fn read(command: &str, in_path: Option<&str>, body: &str) -> Result<Asked, String> {
@@ -23,15 +23,23 @@ fn every_command_and_every_path_is_there_once() {
     }
 }
 
-/// Whatever the word of the table says, the reading asks for it.
+/// Whatever the word of the table says, the reading asks for it, and tells what it may cost.
 #[test]
 fn what_is_dangerous_has_its_word() {
-    for (command, body, word) in
-        [("motors", r#"{"state": "off"}"#, "motors off"), ("reboot", "", "reboot"), ("shutdown", "{}", "shutdown")]
-    {
+    for (command, body, word, cost) in [
+        (
+            "motors",
+            r#"{"state": "off"}"#,
+            "motors off",
+            "the camera falls to where its weight takes it; to a Gremsy that speaks v2 it is RETRACT, and some firmware \
+             switches the motors on again only after a restart",
+        ),
+        ("reboot", "", "reboot", "the camera is not held until the gimbal has started"),
+        ("shutdown", "{}", "shutdown", "the camera is not held any more, and the gimbal must be switched on by hand"),
+    ] {
         let action = Action::of_command(command).expect(command);
-        assert_eq!(action.word, Some(word));
-        let refusal = format!("this is dangerous; it is done when the body says \"confirm\": \"{word}\"");
+        assert_eq!(action.word(), Some(word));
+        let refusal = format!("this is dangerous: {cost}; it is done when the body says \"confirm\": \"{word}\"");
         assert_eq!(read(command, None, body), Err(refusal.clone()));
         for wrong in ["true", "\"yes\"", "\"\"", "null", "1"] {
             let body = format!(r#"{{"state": "off", "confirm": {wrong}}}"#)
@@ -41,7 +49,7 @@ fn what_is_dangerous_has_its_word() {
         let state = if command == "motors" { r#""state": "off", "# } else { "" };
         let asked = read(command, None, &format!(r#"{{{state}"confirm": "{word}"}}"#)).expect("confirmed");
         assert!(asked.is_dangerous());
-        assert_eq!(word_for(&asked), Some(word));
+        assert_eq!(danger_of(&asked).map(|danger| danger.word), Some(word));
     }
     let on = read("motors", None, r#"{"state": "on"}"#).expect("not dangerous");
     assert!(!on.is_dangerous());

@@ -7,7 +7,7 @@ use clap::error::ErrorKind;
 use clap::{Arg, ArgAction, ArgMatches, Command, Error, FromArgMatches, Subcommand};
 use serde_json::Value;
 
-use crate::actions::{self, ACTIONS, Action, CONFIRM, Field, Kind, Wrong};
+use crate::actions::{self, ACTIONS, Action, CONFIRM, Danger, Field, Kind, Wrong};
 
 /// What is to be done with a gimbal, besides showing it.
 #[derive(Clone, Debug)]
@@ -43,8 +43,8 @@ fn command(action: &'static Action) -> Command {
     for (at, field) in action.fields.iter().enumerate() {
         command = command.arg(argument(field).display_order(at));
     }
-    if let Some(word) = action.word {
-        let help = format!("Without it '{word}' is not done, which can cost the camera or the flight");
+    if let Some(Danger { word, cost }) = action.danger {
+        let help = format!("Without it '{word}' is not done, which can cost the camera or the flight: {cost}");
         command = command.arg(Arg::new(CONFIRM).long(confirmation(word)).action(ArgAction::SetTrue).help(help));
     }
     if action.command == "turn" {
@@ -87,8 +87,9 @@ fn typed(action: &Action, name: &str) -> String {
 /// What is wrong, in the words of the command line.
 fn in_typed_words(action: &Action, wrong: Wrong) -> String {
     match wrong {
-        Wrong::Unconfirmed { word } => {
-            format!("'{word}' can cost the camera or the flight; if it is meant, add --{}", confirmation(word))
+        Wrong::Unconfirmed(Danger { word, cost }) => {
+            let option = confirmation(word);
+            format!("'{word}' can cost the camera or the flight: {cost}; if it is meant, add --{option}")
         }
         Wrong::Value { name, found, expected } => {
             format!("{}: found {found}; expected {expected}", typed(action, name))
@@ -156,7 +157,7 @@ fn read(action: &'static Action, matches: &ArgMatches) -> Result<Act, Error> {
         .body_fields()
         .filter_map(|field| given(field).map(|text| (field.name.to_owned(), field.kind.of_text(text))))
         .collect();
-    if let Some(word) = action.word.filter(|_| matches.get_flag(CONFIRM)) {
+    if let Some(word) = action.word().filter(|_| matches.get_flag(CONFIRM)) {
         body.push((CONFIRM.to_owned(), word.into()));
     }
     let in_path = action.path_field().and_then(given).cloned();
@@ -213,7 +214,7 @@ mod tests {
                 line.pop();
                 line.push("7".to_owned());
             }
-            line.extend(action.word.map(|word| format!("--{}", confirmation(word))));
+            line.extend(action.word().map(|word| format!("--{}", confirmation(word))));
             let line = line.join(" ");
 
             let (command, in_path, body) = act(&line).unwrap_or_else(|error| panic!("{line}: {error}"));
@@ -224,7 +225,7 @@ mod tests {
             for field in action.body_fields() {
                 assert!(!body[field.name].is_null(), "{line}: {body}");
             }
-            assert!(body[CONFIRM].as_str() == action.word, "{line}: {body}");
+            assert!(body[CONFIRM].as_str() == action.word(), "{line}: {body}");
         }
     }
 
@@ -252,8 +253,13 @@ mod tests {
     #[test]
     fn what_is_wrong_is_said_at_once() {
         for (line, expected) in [
-            ("motors off", "'motors off' can cost the camera or the flight; if it is meant, add --yes-motors-off"),
-            ("reboot", "'reboot' can cost the camera or the flight; if it is meant, add --yes-reboot"),
+            ("motors off", "'motors off' can cost the camera or the flight: the camera falls to where its weight takes it; to a \
+                Gremsy that speaks v2 it is RETRACT, and some firmware switches the motors on again only after a restart; if it \
+                is meant, add --yes-motors-off"),
+            ("motors --help", "camera falls to where its weight takes it; to a Gremsy that speaks v2 it is RETRACT, and some \
+                firmware switches the motors on again only after a restart\n"),
+            ("reboot", "'reboot' can cost the camera or the flight: the camera is not held until the gimbal has started; if it is \
+                meant, add --yes-reboot"),
             ("shutdown --yes-reboot", "unexpected argument '--yes-reboot'"),
             ("point", "nothing is asked for; expected at least one of --pitch-deg, --yaw-deg, --roll-deg"),
             ("point", "Usage: gimbald gimbal NAME point [OPTIONS]\n"),

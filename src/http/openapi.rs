@@ -4,7 +4,7 @@ use serde_json::{Map, Value, json};
 
 use super::gimbals::PARTS;
 use super::routes::GIMBALS;
-use crate::actions::{ACTIONS, Action, CONFIRM, Field, Kind};
+use crate::actions::{ACTIONS, Action, CONFIRM, Danger, Field, Kind};
 
 pub fn description() -> Value {
     let mut paths = Map::new();
@@ -73,12 +73,13 @@ fn asking(action: &Action, parameters: &[&Value]) -> Value {
     for field in action.body_fields() {
         properties.insert(field.name.to_owned(), schema(field));
     }
-    if let Some(word) = action.word {
-        properties.insert(CONFIRM.to_owned(), json!({"const": word, "description": "what is dangerous needs it"}));
+    if let Some(Danger { word, cost }) = action.danger {
+        let about = format!("what is dangerous needs it: {cost}");
+        properties.insert(CONFIRM.to_owned(), json!({"const": word, "description": about}));
     }
     let mut required: Vec<&str> = action.body_fields().filter(|field| field.required).map(|field| field.name).collect();
     // Where there is nothing else to say it is always dangerous.
-    required.extend(action.word.filter(|_| action.fields.is_empty()).map(|_| CONFIRM));
+    required.extend(action.danger.filter(|_| action.fields.is_empty()).map(|_| CONFIRM));
     let body = json!({
         "type": "object",
         "additionalProperties": false,

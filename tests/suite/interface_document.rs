@@ -18,7 +18,7 @@ fn every_action_has_its_row() {
 fn row(action: &Action) -> String {
     let fields: Vec<String> = action.body_fields().map(described).collect();
     let mut fields = if fields.is_empty() { "–".to_owned() } else { fields.join("; ") };
-    if let Some(word) = action.word {
+    if let Some(word) = action.word() {
         let when = if action.path == "motors" { " for `off`" } else { "" };
         let confirmed = format!("`{CONFIRM}`: `{word}`{when}");
         fields = if fields == "–" { confirmed } else { format!("{fields}; {confirmed}") };

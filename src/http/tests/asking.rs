@@ -116,7 +116,7 @@ pub fn example(action: &Action) -> (Option<String>, String) {
     };
     let mut body: serde_json::Map<String, Value> =
         action.body_fields().map(|field| (field.name.to_owned(), value(field.kind))).collect();
-    if let Some(word) = action.word {
+    if let Some(word) = action.word() {
         body.insert(CONFIRM.to_owned(), word.into());
     }
     let in_path = action.path_field().map(|field| value(field.kind).as_str().expect("text").to_owned());
@@ -132,9 +132,17 @@ fn what_is_wrong_with_a_body_is_said() {
             "motors",
             r#"{"state": "off"}"#,
             422,
-            r#"this is dangerous; it is done when the body says "confirm": "motors off""#,
+            "this is dangerous: the camera falls to where its weight takes it; to a Gremsy that speaks v2 it is RETRACT, and \
+             some firmware switches the motors on again only after a restart; it is done when the body says \"confirm\": \
+             \"motors off\"",
         ),
-        ("reboot", "", 422, r#"this is dangerous; it is done when the body says "confirm": "reboot""#),
+        (
+            "reboot",
+            "",
+            422,
+            "this is dangerous: the camera is not held until the gimbal has started; it is done when the body says \
+             \"confirm\": \"reboot\"",
+        ),
         ("point", r#"{"pitch_deg": -500}"#, 422, "pitch_deg: found -500; expected a number from -180 to 180"),
         ("stop", "{", 400, "the body is no JSON object: EOF while parsing an object at line 1 column 1"),
         ("stop", "\u{0}", 400, "the body is no JSON object: expected value at line 1 column 1"),

@@ -16,7 +16,7 @@ fn the_window_describes_itself() {
         for field in action.body_fields() {
             assert_eq!(schema["properties"][field.name]["description"], field.about, "{}", action.path);
         }
-        assert_eq!(schema["properties"][CONFIRM]["const"].as_str(), action.word, "{}", action.path);
+        assert_eq!(schema["properties"][CONFIRM]["const"].as_str(), action.word(), "{}", action.path);
     }
     let statuses = |path: &str, method: &str| -> Vec<&str> {
         let responses = described["paths"][path][method]["responses"].as_object().expect(path);

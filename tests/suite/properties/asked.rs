@@ -59,7 +59,7 @@ fn order() -> impl Strategy<Value = Happening> {
                     body.insert(name.to_owned(), value);
                 }
             }
-            if let Some(word) = action.word.filter(|_| confirms) {
+            if let Some(word) = action.word().filter(|_| confirms) {
                 body.insert("confirm".to_owned(), word.into());
             }
             Happening::Asked(action, path, Value::Object(body).to_string())
