@@ -18,7 +18,8 @@ pub(super) static MOTORS_OFF: Danger = Danger {
            switches the motors on again only after a restart",
 };
 
-pub(super) static REBOOT: Danger = Danger { word: "reboot", cost: "the camera is not held until the gimbal has started" };
+pub(super) static REBOOT: Danger =
+    Danger { word: "reboot", cost: "the camera is not held until the gimbal has started" };
 
 pub(super) static SHUTDOWN: Danger =
     Danger { word: "shutdown", cost: "the camera is not held any more, and the gimbal must be switched on by hand" };

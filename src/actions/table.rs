@@ -1,7 +1,7 @@
 //! The table itself. Angles in degrees, pitch up and yaw to the right positive.
 
-use super::danger::{MOTORS_OFF, REBOOT, SHUTDOWN};
 use super::Action;
+use super::danger::{MOTORS_OFF, REBOOT, SHUTDOWN};
 use super::fields::{Field, Kind, Values, Wrong};
 use crate::geometry::{Angle, AngularRate, AxisLimits, YawFrame};
 use crate::gimbals::operation::{

@@ -253,13 +253,22 @@ mod tests {
     #[test]
     fn what_is_wrong_is_said_at_once() {
         for (line, expected) in [
-            ("motors off", "'motors off' can cost the camera or the flight: the camera falls to where its weight takes it; to a \
+            (
+                "motors off",
+                "'motors off' can cost the camera or the flight: the camera falls to where its weight takes it; to a \
                 Gremsy that speaks v2 it is RETRACT, and some firmware switches the motors on again only after a restart; if it \
-                is meant, add --yes-motors-off"),
-            ("motors --help", "camera falls to where its weight takes it; to a Gremsy that speaks v2 it is RETRACT, and some \
-                firmware switches the motors on again only after a restart\n"),
-            ("reboot", "'reboot' can cost the camera or the flight: the camera is not held until the gimbal has started; if it is \
-                meant, add --yes-reboot"),
+                is meant, add --yes-motors-off",
+            ),
+            (
+                "motors --help",
+                "camera falls to where its weight takes it; to a Gremsy that speaks v2 it is RETRACT, and some \
+                firmware switches the motors on again only after a restart\n",
+            ),
+            (
+                "reboot",
+                "'reboot' can cost the camera or the flight: the camera is not held until the gimbal has started; if it is \
+                meant, add --yes-reboot",
+            ),
             ("shutdown --yes-reboot", "unexpected argument '--yes-reboot'"),
             ("point", "nothing is asked for; expected at least one of --pitch-deg, --yaw-deg, --roll-deg"),
             ("point", "Usage: gimbald gimbal NAME point [OPTIONS]\n"),

@@ -36,6 +36,8 @@ enum ScanError {
     NoSuchPort { path: PathBuf, cause: io::Error },
     #[error("{}: not a serial port, or one without hardware; expected a device such as /dev/ttyUSB0", .0.display())]
     NotASerialPort(PathBuf),
+    #[error("{}: {what}, where no gimbal can be; expected a serial port such as /dev/ttyUSB0", path.display())]
+    NoLine { path: PathBuf, what: &'static str },
     #[error("no serial ports found")]
     NoPorts,
     #[error("nothing answered")]
@@ -49,7 +51,7 @@ enum ScanError {
 impl ScanError {
     fn exit_code(&self) -> ExitCode {
         match self {
-            Self::NotASerialPort(_) => ExitCode::Usage,
+            Self::NotASerialPort(_) | Self::NoLine { .. } => ExitCode::Usage,
             Self::Daemon(error) => error.exit_code(),
             Self::NoSuchPort { .. } | Self::NoPorts | Self::NothingAnswered | Self::Runtime(_) => ExitCode::Unavailable,
         }
@@ -105,6 +107,10 @@ fn run(
                     if device.is_some() {
                         return Err(ScanError::NotASerialPort(port.name));
                     }
+                }
+                // None of these is ever listed, so it was named.
+                Err(TryError::Port(PortError::NoLine(what))) => {
+                    return Err(ScanError::NoLine { path: port.name, what });
                 }
                 Err(error) => say(errors, format_args!("{shown}: {error}")),
             }
@@ -534,6 +540,9 @@ mod tests {
             file.display()
         );
         assert_eq!((error.exit_code(), error.to_string()), (ExitCode::Usage, text));
+        let error = scan_at(Path::new("/dev/ptmx"), &no_daemon()).0.expect_err("no line");
+        let text = "/dev/ptmx: what makes pseudo-terminals, where no gimbal can be; expected a serial port such as /dev/ttyUSB0";
+        assert_eq!((error.exit_code(), error.to_string().as_str()), (ExitCode::Usage, text));
         let error = scan_at(&gone, &no_daemon()).0.expect_err("not there");
         let text = format!("{}: No such file or directory (os error 2)", gone.display());
         assert_eq!((error.exit_code(), error.to_string()), (ExitCode::Unavailable, text));

@@ -33,6 +33,9 @@ pub enum PortError {
     InUse,
     #[error("not a serial port, or one without hardware")]
     NotASerialPort,
+    /// A terminal behind which there is no line; what it is.
+    #[error("{0}, where no gimbal can be")]
+    NoLine(&'static str),
     #[error("cannot be opened: {0}")]
     Open(String),
 }
@@ -50,6 +53,10 @@ impl Port {
         if !file.file_type().is_char_device() || subsystem(&file).is_some_and(|subsystem| subsystem != "tty") {
             return Err(PortError::NotASerialPort);
         }
+        // To open the multiplexer makes a new pseudo-terminal, which stays as silent as nobody at a real port.
+        if let Some(what) = terminal_without_line(major(file.rdev()), minor(file.rdev())) {
+            return Err(PortError::NoLine(what));
+        }
         if let Some(holder) = holder(Path::new("/proc"), &self.device) {
             return Err(holder);
         }
@@ -64,6 +71,16 @@ impl Port {
             ErrorKind::NoDevice => PortError::InUse,
             ErrorKind::InvalidInput | ErrorKind::Unknown | ErrorKind::Io(_) => PortError::Open(error.description),
         })
+    }
+}
+
+/// What a terminal is that leads to no line, by the numbers of its device (the kernel's `devices.txt`).
+const fn terminal_without_line(major: u64, minor: u64) -> Option<&'static str> {
+    match (major, minor) {
+        (2, _) | (5, 2) => Some("what makes pseudo-terminals"),
+        (4, 0..64) | (5, 1) => Some("a console of this computer"),
+        (5, 0) => Some("the terminal that gimbald was started from"),
+        _ => None,
     }
 }
 
@@ -196,6 +213,31 @@ mod tests {
         for path in [file.as_path(), folder.path(), Path::new("/dev/null")] {
             let refused = Port::at(path).expect("it is there").open(115_200);
             assert!(matches!(refused, Err(PortError::NotASerialPort)), "{}", path.display());
+        }
+    }
+
+    /// "Refuse it clearly": the multiplexer is a terminal, and whoever opens it finds a pseudo-terminal where nobody is.
+    #[test]
+    fn a_terminal_without_a_line_is_not_opened() {
+        for path in ["/dev/ptmx", "/dev/pts/ptmx"] {
+            let refused = Port::at(Path::new(path)).expect("it is there").open(115_200).map(drop);
+            let text = refused.expect_err("it is no port").to_string();
+            assert_eq!(text, "what makes pseudo-terminals, where no gimbal can be", "{path}");
+        }
+        for (numbers, what) in [
+            ((2, 7), Some("what makes pseudo-terminals")),
+            ((4, 0), Some("a console of this computer")),
+            ((4, 63), Some("a console of this computer")),
+            ((4, 64), None), // ttyS0
+            ((5, 0), Some("the terminal that gimbald was started from")),
+            ((5, 1), Some("a console of this computer")),
+            ((5, 64), None),   // cua0
+            ((136, 0), None),  // pts/0
+            ((166, 0), None),  // ttyACM0
+            ((188, 0), None),  // ttyUSB0
+            ((204, 64), None), // ttyAMA0
+        ] {
+            assert_eq!(terminal_without_line(numbers.0, numbers.1), what, "{numbers:?}");
         }
     }
 
