@@ -6,6 +6,7 @@ pub mod daemon;
 pub mod documented;
 pub mod ground_station;
 pub mod hub;
+pub mod interception;
 pub mod line;
 pub mod script;
 pub mod tlog;

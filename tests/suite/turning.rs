@@ -17,8 +17,9 @@ use gimbald::sim::vehicle::{Vehicle, VehicleSettings};
 use gimbald::timestamp::Timestamp;
 use gimbald::wire::MavId;
 
-use crate::support::cable::{Cable, Cabled};
+use crate::support::cable::Cable;
 use crate::support::hub::Watched;
+use crate::support::interception::Intercepted;
 use crate::support::script::{ACCEPTED, NAN, command_long, ground_heartbeat, set_pitchyaw};
 use crate::support::world::{GCS, GIMBAL, MANAGER, Place, Places, World, three_links};
 
@@ -69,8 +70,8 @@ impl Gimbal {
             Kind::GremsyV2 => Self::Gremsy(Watched::new(gremsy(gremsy::Generation::V2))),
         };
         match gimbal.clone() {
-            Self::V2Device(peer) => world.install(place, Cabled { peer, cable: cable.clone() }),
-            Self::Gremsy(peer) => world.install(place, Cabled { peer, cable: cable.clone() }),
+            Self::V2Device(peer) => world.install(place, Intercepted::new(peer, cable.clone())),
+            Self::Gremsy(peer) => world.install(place, Intercepted::new(peer, cable.clone())),
         }
         (gimbal, cable)
     }

@@ -1,11 +1,8 @@
 //! The way through, from a ground station's command to the gimbal's movement, with simulated peers at both ends.
 
-use std::cell::RefCell;
-use std::rc::Rc;
 use std::time::Duration;
 
 use gimbald::gimbals::mavlink_v2::sim::{Device, DeviceSettings};
-use gimbald::sim::peer::Peer;
 use gimbald::sim::vehicle::{Autopilot, StateForGimbals, Vehicle, VehicleSettings};
 use gimbald::timestamp::Timestamp;
 use gimbald::wire::dialect::{
@@ -13,6 +10,7 @@ use gimbald::wire::dialect::{
     MavMessage,
 };
 
+use crate::support::hub::Watched;
 use crate::support::world::{GCS, MANAGER, World, heartbeat, three_links};
 
 /// Protocol checklist 81: "When command 1000 (-30, 45, NaN, NaN, 44, -, 154) is accepted, the following 284s converge to
@@ -59,7 +57,7 @@ fn a_gimbal_keeps_its_direction_by_the_state_that_is_made_for_it() {
             let state_for_gimbals = StateForGimbals::Denied;
             let vehicle = VehicleSettings { autopilot, state_for_gimbals, ..VehicleSettings::default() };
             let truth = Vehicle::new(Timestamp::ZERO, vehicle);
-            let device = Shared(Rc::new(RefCell::new(Device::new(Timestamp::ZERO, DeviceSettings::default()))));
+            let device = Watched::new(Device::new(Timestamp::ZERO, DeviceSettings::default()));
             world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, vehicle));
             world.install(places.gimbal, device.clone());
             // The gimbal is really turned with the vehicle, whatever it believes.
@@ -77,7 +75,7 @@ fn a_gimbal_keeps_its_direction_by_the_state_that_is_made_for_it() {
             let mut worst: f64 = 0.0;
             for _ in 0..20 {
                 fly_for(&mut world, 1);
-                worst = worst.max((device.yaw_from_north_deg(world.now) - 120.0).abs());
+                worst = worst.max((yaw_from_north_deg(&device, world.now) - 120.0).abs());
             }
 
             let turned = truth.motion(world.now).heading_rate.degrees_per_second() * 20.0;
@@ -96,42 +94,10 @@ fn a_gimbal_keeps_its_direction_by_the_state_that_is_made_for_it() {
     }
 }
 
-/// A simulated gimbal at a place, and to look at.
-#[derive(Clone)]
-struct Shared(Rc<RefCell<Device>>);
-
-impl Shared {
-    /// Where it really points.
-    fn yaw_from_north_deg(&self, now: Timestamp) -> f64 {
-        let device = self.0.borrow();
-        (device.plant().platform_heading(now) + device.plant().pose().yaw).wrapped().degrees()
-    }
-}
-
-impl Peer for Shared {
-    fn handle_received(&mut self, now: Timestamp, bytes: &[u8]) {
-        self.0.borrow_mut().handle_received(now, bytes);
-    }
-
-    fn handle_timeout(&mut self, now: Timestamp) {
-        self.0.borrow_mut().handle_timeout(now);
-    }
-
-    fn poll_output(&mut self) -> Option<Vec<u8>> {
-        self.0.borrow_mut().poll_output()
-    }
-
-    fn poll_timeout(&self) -> Option<Timestamp> {
-        self.0.borrow().poll_timeout()
-    }
-
-    fn handle_reboot(&mut self, now: Timestamp) {
-        self.0.borrow_mut().handle_reboot(now);
-    }
-
-    fn handle_disturbance(&mut self, now: Timestamp, motion: gimbald::sim::peer::PlatformMotion) {
-        self.0.borrow_mut().handle_disturbance(now, motion);
-    }
+/// Where it really points.
+fn yaw_from_north_deg(device: &Watched<Device>, now: Timestamp) -> f64 {
+    let device = device.look();
+    (device.plant().platform_heading(now) + device.plant().pose().yaw).wrapped().degrees()
 }
 
 fn pitchyaw(pitch: f32, yaw: f32, flags: f32) -> MavMessage {

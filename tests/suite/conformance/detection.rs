@@ -13,7 +13,6 @@ use gimbald::gimbals::gremsy::sim as gremsy;
 use gimbald::gimbals::gremsy::version::FirmwareVersion;
 use gimbald::gimbals::mavlink_v1::sim::{Device, DeviceSettings, Feedback};
 use gimbald::gimbals::mavlink_v2::sim as v2;
-use gimbald::sim::peer::{Peer, PlatformMotion};
 use gimbald::sim::plant::PlantSettings;
 use gimbald::sim::vehicle::{Vehicle, VehicleSettings};
 use gimbald::timestamp::Timestamp;
@@ -25,6 +24,7 @@ use gimbald::wire::dialect::{
 use gimbald::wire::{DatagramFrames, MavId};
 
 use crate::support::hub::Watched;
+use crate::support::interception::{Intercepted, Interceptor, Passage};
 use crate::support::script::{
     ACCEPTED, NAN, TEMPORARILY_REJECTED, command_long, device_information, gimbal_heartbeat, ground_heartbeat, of,
     pitch_yaw_deg, usual_capabilities,
@@ -209,39 +209,13 @@ fn no_status_tells_an_id_that_the_gimbal_turns_out_not_to_have() {
 /// A Gremsy that does not answer any more what it was known by.
 #[derive(Debug)]
 struct Forgetful {
-    device: gremsy::Device,
     is_mute: Rc<Cell<bool>>,
 }
 
-impl Peer for Forgetful {
-    fn handle_received(&mut self, now: Timestamp, bytes: &[u8]) {
-        self.device.handle_received(now, bytes);
-    }
-
-    fn handle_timeout(&mut self, now: Timestamp) {
-        self.device.handle_timeout(now);
-    }
-
-    fn poll_output(&mut self) -> Option<Vec<u8>> {
-        loop {
-            let bytes = self.device.poll_output()?;
-            let id = DatagramFrames::new(&bytes).next_frame().expect("a frame").message_id();
-            if !self.is_mute.get() || !matches!(id, 22 | 283) {
-                return Some(bytes);
-            }
-        }
-    }
-
-    fn poll_timeout(&self) -> Option<Timestamp> {
-        self.device.poll_timeout()
-    }
-
-    fn handle_reboot(&mut self, now: Timestamp) {
-        self.device.handle_reboot(now);
-    }
-
-    fn handle_disturbance(&mut self, now: Timestamp, motion: PlatformMotion) {
-        self.device.handle_disturbance(now, motion);
+impl Interceptor for Forgetful {
+    fn towards_core(&mut self, bytes: &[u8]) -> Passage {
+        let id = DatagramFrames::new(bytes).next_frame().expect("a frame").message_id();
+        if self.is_mute.get() && matches!(id, 22 | 283) { Passage::Lost } else { Passage::Through }
     }
 }
 
@@ -259,10 +233,9 @@ fn a_gremsy_that_was_left_turning_is_stopped_before_it_is_known_again() {
     let (mut world, places) = World::empty(three_links());
     world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
     let is_mute = Rc::new(Cell::new(false));
-    let device = gremsy::Device::new(Timestamp::ZERO, settings);
-    let device = Watched::new(Forgetful { device, is_mute: is_mute.clone() });
-    let yaw = || device.look().device.plant().pose().yaw.degrees();
-    world.install(places.gimbal, device.clone());
+    let device = Watched::new(gremsy::Device::new(Timestamp::ZERO, settings));
+    let yaw = || device.look().plant().pose().yaw.degrees();
+    world.install(places.gimbal, Intercepted::new(device.clone(), Forgetful { is_mute: is_mute.clone() }));
     run(&mut world, places, 30 * SECOND);
     assert_eq!(turn(&mut world, places, 5.0), Some(ACCEPTED));
     run(&mut world, places, SECOND);

@@ -3,8 +3,6 @@
 use std::cell::Cell;
 use std::rc::Rc;
 
-use gimbald::sim::peer::{Peer, PlatformMotion};
-use gimbald::timestamp::Timestamp;
 use gimbald::wire::dialect::{
     COMMAND_LONG_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA, GIMBAL_MANAGER_STATUS_DATA, MavMessage,
     PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA,
@@ -12,6 +10,7 @@ use gimbald::wire::dialect::{
 use gimbald::wire::target::message_shape;
 use gimbald::wire::{DatagramFrames, Frame, FrameBuffer, MavId};
 
+use super::interception::{Interceptor, Passage};
 use super::wire::checksum;
 use super::world::GIMBAL;
 
@@ -38,53 +37,23 @@ impl Cable {
     }
 }
 
-/// A gimbal at the end of a cable.
-pub struct Cabled<P> {
-    pub peer: P,
-    pub cable: Cable,
-}
-
-impl<P: Peer> Peer for Cabled<P> {
-    fn handle_received(&mut self, now: Timestamp, bytes: &[u8]) {
-        if self.cable.is_cut.get() {
-            return;
+/// For the gimbal at its end.
+impl Interceptor for Cable {
+    fn towards_peer(&mut self, bytes: &[u8]) -> Passage {
+        if self.is_cut.get() {
+            return Passage::Lost;
         }
-        match self.cable.alias.get() {
-            None => self.peer.handle_received(now, bytes),
-            Some(alias) => {
-                if let Some(bytes) = towards_gimbal(bytes, alias) {
-                    self.peer.handle_received(now, &bytes);
-                }
-            }
+        match self.alias.get() {
+            None => Passage::Through,
+            Some(alias) => towards_gimbal(bytes, alias).map_or(Passage::Lost, Passage::As),
         }
     }
 
-    fn handle_timeout(&mut self, now: Timestamp) {
-        self.peer.handle_timeout(now);
-    }
-
-    fn poll_output(&mut self) -> Option<Vec<u8>> {
-        loop {
-            let bytes = self.peer.poll_output()?;
-            if !self.cable.is_cut.get() {
-                return Some(match self.cable.alias.get() {
-                    None => bytes,
-                    Some(alias) => from_gimbal(bytes, alias),
-                });
-            }
+    fn towards_core(&mut self, bytes: &[u8]) -> Passage {
+        if self.is_cut.get() {
+            return Passage::Lost;
         }
-    }
-
-    fn poll_timeout(&self) -> Option<Timestamp> {
-        self.peer.poll_timeout()
-    }
-
-    fn handle_reboot(&mut self, now: Timestamp) {
-        self.peer.handle_reboot(now);
-    }
-
-    fn handle_disturbance(&mut self, now: Timestamp, motion: PlatformMotion) {
-        self.peer.handle_disturbance(now, motion);
+        self.alias.get().map_or(Passage::Through, |alias| Passage::As(from_gimbal(bytes.to_vec(), alias)))
     }
 }
 

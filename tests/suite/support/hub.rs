@@ -4,7 +4,7 @@ use std::cell::{Ref, RefCell, RefMut};
 use std::collections::VecDeque;
 use std::rc::Rc;
 
-use gimbald::sim::peer::Peer;
+use gimbald::sim::peer::{Peer, PlatformMotion};
 use gimbald::timestamp::Timestamp;
 
 /// Several peers that hear each other and share the line to the daemon: a gimbal behind an autopilot that passes on
@@ -76,6 +76,12 @@ impl Peer for Hub {
             member.handle_reboot(now);
         }
     }
+
+    fn handle_disturbance(&mut self, now: Timestamp, motion: PlatformMotion) {
+        for member in &mut self.members {
+            member.handle_disturbance(now, motion);
+        }
+    }
 }
 
 /// A peer that lives in the world and can be looked at.
@@ -120,5 +126,9 @@ impl<P: Peer> Peer for Watched<P> {
 
     fn handle_reboot(&mut self, now: Timestamp) {
         self.touch().handle_reboot(now);
+    }
+
+    fn handle_disturbance(&mut self, now: Timestamp, motion: PlatformMotion) {
+        self.touch().handle_disturbance(now, motion);
     }
 }

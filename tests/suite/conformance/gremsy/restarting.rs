@@ -7,12 +7,12 @@ use gimbald::bridge::settings::SystemId;
 use gimbald::gimbals::operation::{OperationError, Restart, YawMode};
 use gimbald::manager::asked::NotDone;
 use gimbald::manager::request::Refusal;
-use gimbald::sim::peer::{Peer, PlatformMotion};
 use gimbald::wire::dialect::COMMAND_ACK_DATA;
 use gimbald::wire::ids::CommandResult;
 use gimbald::wire::{DatagramFrames, encode_to_vec};
 
 use super::*;
+use crate::support::interception::{Intercepted, Interceptor, Passage};
 use crate::support::script::{
     ACCEPTED, DENIED, FAILED, NAN, TEMPORARILY_REJECTED, command_int, set_attitude, set_manual_control, set_pitchyaw,
 };
@@ -34,65 +34,39 @@ enum Obedience {
 
 #[derive(Debug)]
 struct Stubborn {
-    device: Device,
     obedience: Obedience,
     heard: u8,
-    says: Option<Vec<u8>>,
 }
 
-impl Peer for Stubborn {
-    fn handle_received(&mut self, now: Timestamp, bytes: &[u8]) {
+impl Interceptor for Stubborn {
+    fn towards_peer(&mut self, bytes: &[u8]) -> Passage {
         let mut frames = DatagramFrames::new(bytes);
         let command = frames.next_frame().and_then(|frame| frame.decode::<COMMAND_LONG_DATA>());
-        if command.is_some_and(|command| command.command == command::PREFLIGHT_REBOOT_SHUTDOWN) {
-            self.heard += 1;
-            let result = match self.obedience {
-                Obedience::AnswerLost => None,
-                Obedience::HearsTheLast if self.heard < 3 => return,
-                Obedience::HearsTheLast => None,
-                Obedience::Refuses => Some(DENIED),
-                Obedience::Pretends => Some(ACCEPTED),
-            };
-            if let Some(result) = result {
-                let ack = COMMAND_ACK_DATA {
-                    command: command::PREFLIGHT_REBOOT_SHUTDOWN,
-                    result,
-                    progress: 255,
-                    result_param2: 0,
-                    target_system: MANAGER.system,
-                    target_component: MANAGER.component,
-                };
-                self.says = Some(encode_to_vec(GIMBAL, 0, &ack));
-                return;
-            }
+        if command.is_none_or(|command| command.command != command::PREFLIGHT_REBOOT_SHUTDOWN) {
+            return Passage::Through;
         }
-        self.device.handle_received(now, bytes);
+        self.heard += 1;
+        let result = match self.obedience {
+            Obedience::HearsTheLast if self.heard < 3 => return Passage::Lost,
+            Obedience::AnswerLost | Obedience::HearsTheLast => return Passage::Through,
+            Obedience::Refuses => DENIED,
+            Obedience::Pretends => ACCEPTED,
+        };
+        let ack = COMMAND_ACK_DATA {
+            command: command::PREFLIGHT_REBOOT_SHUTDOWN,
+            result,
+            progress: 255,
+            result_param2: 0,
+            target_system: MANAGER.system,
+            target_component: MANAGER.component,
+        };
+        Passage::Answered(encode_to_vec(GIMBAL, 0, &ack))
     }
 
-    fn handle_timeout(&mut self, now: Timestamp) {
-        self.device.handle_timeout(now);
-    }
-
-    fn poll_output(&mut self) -> Option<Vec<u8>> {
-        if let Some(bytes) = self.says.take() {
-            return Some(bytes);
-        }
-        let bytes = self.device.poll_output()?;
-        let frame = DatagramFrames::new(&bytes).next_frame().and_then(|frame| frame.decode::<COMMAND_ACK_DATA>());
-        let is_lost = frame.is_some_and(|ack| ack.command == command::PREFLIGHT_REBOOT_SHUTDOWN);
-        if is_lost { self.poll_output() } else { Some(bytes) }
-    }
-
-    fn poll_timeout(&self) -> Option<Timestamp> {
-        self.device.poll_timeout()
-    }
-
-    fn handle_reboot(&mut self, now: Timestamp) {
-        self.device.handle_reboot(now);
-    }
-
-    fn handle_disturbance(&mut self, now: Timestamp, motion: PlatformMotion) {
-        self.device.handle_disturbance(now, motion);
+    fn towards_core(&mut self, bytes: &[u8]) -> Passage {
+        let ack = DatagramFrames::new(bytes).next_frame().and_then(|frame| frame.decode::<COMMAND_ACK_DATA>());
+        let is_lost = ack.is_some_and(|ack| ack.command == command::PREFLIGHT_REBOOT_SHUTDOWN);
+        if is_lost { Passage::Lost } else { Passage::Through }
     }
 }
 
@@ -100,7 +74,7 @@ fn stubborn(generation: Generation, obedience: Obedience) -> (World, Places) {
     let (mut world, places) = without_gimbal(GremsySettings::default());
     world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
     let device = Device::new(Timestamp::ZERO, device(generation));
-    world.install(places.gimbal, Stubborn { device, obedience, heard: 0, says: None });
+    world.install(places.gimbal, Intercepted::new(device, Stubborn { obedience, heard: 0 }));
     run(&mut world, places, 20 * SECOND);
     assert_eq!(stage(&world), "running");
     take_control(&mut world);

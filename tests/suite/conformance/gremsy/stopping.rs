@@ -8,10 +8,10 @@ use gimbald::geometry::AngularRate;
 use gimbald::gimbals::gremsy::packet;
 use gimbald::gimbals::operation::{OperationError, YawMode};
 use gimbald::manager::asked::NotDone;
-use gimbald::sim::peer::{Peer, PlatformMotion};
 use gimbald::wire::dialect::{COMMAND_ACK_DATA, MavMessage, MessageData};
 
 use super::*;
+use crate::support::interception::{Intercepted, Interceptor, Passage};
 use crate::support::script::NAN;
 use crate::support::world::GIMBAL;
 
@@ -24,50 +24,16 @@ struct Deaf {
     setpoints: Rc<Cell<u32>>,
 }
 
-#[derive(Debug)]
-struct HardOfHearing {
-    device: Device,
-    deaf: Deaf,
-}
-
-impl HardOfHearing {
-    fn hears(&self, bytes: &[u8]) -> bool {
+impl Interceptor for Deaf {
+    fn towards_peer(&mut self, bytes: &[u8]) -> Passage {
         let id = u32::from_le_bytes([bytes[7], bytes[8], bytes[9], 0]);
         let number = (id == COMMAND_LONG_DATA::ID).then(|| u16::from_le_bytes([bytes[38], bytes[39]]));
         let is_setpoint = number == Some(command::DO_MOUNT_CONTROL) || id == GIMBAL_DEVICE_SET_ATTITUDE_DATA::ID;
-        if is_setpoint && self.deaf.setpoints.get() > 0 {
-            self.deaf.setpoints.set(self.deaf.setpoints.get() - 1);
-            return false;
+        if is_setpoint && self.setpoints.get() > 0 {
+            self.setpoints.set(self.setpoints.get() - 1);
+            return Passage::Lost;
         }
-        number.is_none() || number != self.deaf.command.get()
-    }
-}
-
-impl Peer for HardOfHearing {
-    fn handle_received(&mut self, now: Timestamp, bytes: &[u8]) {
-        if self.hears(bytes) {
-            self.device.handle_received(now, bytes);
-        }
-    }
-
-    fn handle_timeout(&mut self, now: Timestamp) {
-        self.device.handle_timeout(now);
-    }
-
-    fn poll_output(&mut self) -> Option<Vec<u8>> {
-        self.device.poll_output()
-    }
-
-    fn poll_timeout(&self) -> Option<Timestamp> {
-        self.device.poll_timeout()
-    }
-
-    fn handle_reboot(&mut self, now: Timestamp) {
-        self.device.handle_reboot(now);
-    }
-
-    fn handle_disturbance(&mut self, now: Timestamp, motion: PlatformMotion) {
-        self.device.handle_disturbance(now, motion);
+        if number.is_some() && number == self.command.get() { Passage::Lost } else { Passage::Through }
     }
 }
 
@@ -77,7 +43,7 @@ fn turning(generation: Generation) -> (World, Places, Deaf) {
     world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
     let deaf = Deaf::default();
     let device = Device::new(Timestamp::ZERO, device(generation));
-    world.install(places.gimbal, HardOfHearing { device, deaf: deaf.clone() });
+    world.install(places.gimbal, Intercepted::new(device, deaf.clone()));
     run(&mut world, places, 20 * SECOND);
     assert_eq!(seen(&world).details.stage.as_deref(), Some("running"));
     demand(&mut world, places, [NAN, NAN, 0.0, 5.0, 44.0]);
