@@ -9,6 +9,7 @@ mod reports;
 pub mod setpoint;
 mod settings;
 pub mod steering;
+pub mod telling;
 
 use std::time::Duration;
 

@@ -4,19 +4,19 @@ use std::time::Duration;
 
 use super::motors::Motors;
 use super::{Device, StatusTarget};
-use crate::geometry::{Angle, AngularRate, Attitude, AxisLimits, EarthFrame, GimbalAngles};
+use crate::geometry::{Angle, AngularRate};
 use crate::gimbals::gremsy::modes::MAPPING;
 use crate::gimbals::gremsy::parameters::EncoderType;
 use crate::gimbals::gremsy::status::{Activity, Alignment};
 use crate::gimbals::mavlink_v2::sim::setpoint::Mode;
-use crate::sim::plant::{Pose, YawHold};
+use crate::gimbals::mavlink_v2::sim::telling::{self, AttitudeStatus, DeltaYaw};
+use crate::sim::plant::YawHold;
 use crate::timestamp::Timestamp;
-use crate::wire::MavId;
 use crate::wire::dialect::{
-    CharArray, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA, HEARTBEAT_DATA,
-    MOUNT_ORIENTATION_DATA, MOUNT_STATUS_DATA, RAW_IMU_DATA, SYS_STATUS_DATA,
+    CharArray, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA, MOUNT_ORIENTATION_DATA,
+    MOUNT_STATUS_DATA, RAW_IMU_DATA, SYS_STATUS_DATA,
 };
-use crate::wire::ids::{CapFlags, FailureFlags, GimbalFlags, mav_autopilot, mav_state, mav_type, message, mount_mode};
+use crate::wire::ids::{CapFlags, FailureFlags, GimbalFlags, message, mount_mode};
 
 /// More messages a second are dropped, but for a few at once.
 const MOST_PER_SECOND: f64 = 200.0;
@@ -57,14 +57,7 @@ impl Allowance {
 impl Device {
     pub(super) fn report(&mut self, now: Timestamp, id: u32) {
         match id {
-            message::HEARTBEAT => self.line.outbox.send(&HEARTBEAT_DATA {
-                custom_mode: 0,
-                mavtype: mav_type::GIMBAL,
-                autopilot: mav_autopilot::INVALID,
-                base_mode: 0,
-                system_status: mav_state::ACTIVE,
-                mavlink_version: 3,
-            }),
+            message::HEARTBEAT => self.line.outbox.send(&telling::HEARTBEAT),
             message::SYS_STATUS => {
                 let status = self.system_status(now);
                 self.line.outbox.send(&status);
@@ -199,14 +192,10 @@ impl Device {
 
     fn information(&self, now: Timestamp) -> GIMBAL_DEVICE_INFORMATION_DATA {
         let settings = &self.settings;
-        let bounds = |axis: Option<AxisLimits>| {
-            let bound = |angle: Angle| angle.radians() as f32;
-            axis.map_or((f32::NAN, f32::NAN), |axis| (bound(axis.min()), bound(axis.max())))
-        };
         let limits = self.plant.limits();
-        let (roll_min, roll_max) = bounds(limits.roll);
-        let (pitch_min, pitch_max) = bounds(limits.pitch);
-        let (yaw_min, yaw_max) = bounds(limits.yaw);
+        let (roll_min, roll_max) = telling::ends(limits.roll);
+        let (pitch_min, pitch_max) = telling::ends(limits.pitch);
+        let (yaw_min, yaw_max) = telling::ends(limits.yaw);
         let capabilities = CapFlags::HAS_RETRACT
             | CapFlags::HAS_NEUTRAL
             | CapFlags::HAS_ROLL_AXIS
@@ -238,9 +227,10 @@ impl Device {
     }
 
     fn attitude_status(&mut self, now: Timestamp) -> GIMBAL_DEVICE_ATTITUDE_STATUS_DATA {
-        let Pose { roll, pitch, yaw, roll_rate, pitch_rate, yaw_rate } = self.plant.measure(now);
+        let pose = self.plant.measure(now);
         let told = self.heading.at(now).filter(|_| self.leans_on_autopilot());
-        let own_heading = self.own_heading(now);
+        let heading_rate = told.map_or(AngularRate::ZERO, |(_, rate)| rate);
+        let north = (self.own_heading(now), heading_rate);
         let is_locked = self.is_holding_horizon();
         let tells_frame = self.settings.firmware.tells_yaw_frame();
         let is_in_earth = if tells_frame {
@@ -250,20 +240,7 @@ impl Device {
         } else {
             is_locked
         };
-        let heading_rate = told.map_or(AngularRate::ZERO, |(_, rate)| rate);
-        let (yaw, yaw_rate) = if is_in_earth { (yaw + own_heading, yaw_rate + heading_rate) } else { (yaw, yaw_rate) };
-        // The frame is told by the flags, so the type's frame is a formality here.
-        let attitude = Attitude::<EarthFrame>::from_gimbal_angles(GimbalAngles { roll, pitch, yaw });
-        let (delta_yaw, delta_yaw_velocity) = match (tells_frame, told.is_some()) {
-            (false, _) => (0.0, 0.0),
-            (true, true) => (own_heading.wrapped().radians() as f32, heading_rate.radians_per_second() as f32),
-            (true, false) => (f32::NAN, f32::NAN),
-        };
-        let mut flags = match self.steering.mode() {
-            Mode::Retract => GimbalFlags::RETRACT,
-            Mode::Neutral => GimbalFlags::NEUTRAL | GimbalFlags::ROLL_LOCK | GimbalFlags::PITCH_LOCK,
-            Mode::Free => GimbalFlags::ROLL_LOCK | GimbalFlags::PITCH_LOCK,
-        };
+        let mut flags = telling::mode_flags(self.steering.mode());
         flags.set(GimbalFlags::YAW_LOCK, is_locked);
         flags.set(MAPPING, self.is_mapping);
         if tells_frame {
@@ -271,35 +248,24 @@ impl Device {
             flags.set(GimbalFlags::YAW_IN_VEHICLE_FRAME, !is_in_earth);
             flags.set(GimbalFlags::ACCEPTS_YAW_IN_EARTH_FRAME, told.is_some());
         }
-        let target = match self.settings.status_target {
-            StatusTarget::Everyone => None,
-            StatusTarget::Manager => self.latch.manager(now),
-        };
-        let target = target.unwrap_or(MavId::new(0, 0));
-        GIMBAL_DEVICE_ATTITUDE_STATUS_DATA {
+        let status = AttitudeStatus {
             time_boot_ms: self.boot_ms(now),
-            q: attitude.to_wxyz(),
-            angular_velocity_x: roll_rate.radians_per_second() as f32,
-            angular_velocity_y: pitch_rate.radians_per_second() as f32,
-            angular_velocity_z: yaw_rate.radians_per_second() as f32,
-            failure_flags: self.failure_flags(now).bits(),
-            flags: flags.bits(),
-            target_system: target.system,
-            target_component: target.component,
-            delta_yaw,
-            delta_yaw_velocity,
-            gimbal_device_id: 0,
-        }
+            pose,
+            yaw_from: is_in_earth.then_some(north),
+            delta_yaw: if tells_frame { DeltaYaw::Told(told.map(|_| north)) } else { DeltaYaw::Unused },
+            flags,
+            failures: self.failure_flags(now),
+            target: match self.settings.status_target {
+                StatusTarget::Everyone => None,
+                StatusTarget::Manager => self.latch.manager(now),
+            },
+        };
+        status.message()
     }
 
     fn failure_flags(&self, now: Timestamp) -> FailureFlags {
-        let limit = self.plant.at_limit();
-        let mut flags = self.failures;
-        flags.set(FailureFlags::AT_ROLL_LIMIT, limit.roll);
-        flags.set(FailureFlags::AT_PITCH_LIMIT, limit.pitch);
-        flags.set(FailureFlags::AT_YAW_LIMIT, limit.yaw);
+        let mut flags = telling::with_own_failures(self.failures, self.plant.at_limit(), self.latch.manager(now));
         flags.set(FailureFlags::CALIBRATION_RUNNING, self.power.is_starting(now));
-        flags.set(FailureFlags::NO_MANAGER, self.latch.manager(now).is_none());
         flags
     }
 }

@@ -1,15 +1,15 @@
 //! What the device says of itself.
 
 use super::setpoint::Mode;
+use super::telling::{self, AttitudeStatus, DeltaYaw};
 use super::{Device, StatusFrame};
-use crate::geometry::{Angle, AngularRate, Attitude, AxisLimits, EarthFrame, GimbalAngles};
+use crate::geometry::AngularRate;
 use crate::sim::plant::YawHold;
 use crate::timestamp::Timestamp;
 use crate::wire::dialect::{
-    CharArray, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA, HEARTBEAT_DATA,
-    MESSAGE_INTERVAL_DATA,
+    CharArray, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA, MESSAGE_INTERVAL_DATA,
 };
-use crate::wire::ids::{CapFlags, FailureFlags, GimbalFlags, mav_autopilot, mav_state, mav_type, message};
+use crate::wire::ids::{CapFlags, GimbalFlags, message};
 
 impl Device {
     pub(super) fn can_report(&self, id: u32) -> bool {
@@ -25,14 +25,7 @@ impl Device {
     /// Sends message `id`; `argument` says of which message an interval is wanted.
     pub(super) fn report(&mut self, now: Timestamp, id: u32, argument: f64) {
         match id {
-            message::HEARTBEAT => self.line.outbox.send(&HEARTBEAT_DATA {
-                custom_mode: 0,
-                mavtype: mav_type::GIMBAL,
-                autopilot: mav_autopilot::INVALID,
-                base_mode: 0,
-                system_status: mav_state::ACTIVE,
-                mavlink_version: 3,
-            }),
+            message::HEARTBEAT => self.line.outbox.send(&telling::HEARTBEAT),
             message::MESSAGE_INTERVAL => {
                 // A float cast saturates, and turns NaN into 0.
                 let message_id = argument.round() as u16;
@@ -58,17 +51,13 @@ impl Device {
     fn information(&self, now: Timestamp) -> GIMBAL_DEVICE_INFORMATION_DATA {
         let settings = &self.settings;
         let limits = settings.plant.limits;
-        let bounds = |axis: Option<AxisLimits>| {
-            let bound = |angle: Angle| angle.radians() as f32;
-            axis.map_or((f32::NAN, f32::NAN), |axis| (bound(axis.min()), bound(axis.max())))
-        };
-        let (roll_min, roll_max) = bounds(limits.roll);
-        let (pitch_min, pitch_max) = bounds(limits.pitch);
+        let (roll_min, roll_max) = telling::ends(limits.roll);
+        let (pitch_min, pitch_max) = telling::ends(limits.pitch);
         let (yaw_min, yaw_max) = if settings.capabilities.contains(CapFlags::SUPPORTS_INFINITE_YAW) {
             // MAVSDK's gimbal_device_tester knows a yaw without limits by these.
             (f32::NEG_INFINITY, f32::INFINITY)
         } else {
-            bounds(limits.yaw)
+            telling::ends(limits.yaw)
         };
         GIMBAL_DEVICE_INFORMATION_DATA {
             uid: settings.uid,
@@ -105,43 +94,23 @@ impl Device {
             }
             StatusFrame::Legacy => None,
         };
-        let mut yaw = pose.yaw;
-        let mut yaw_rate = pose.yaw_rate.radians_per_second();
-        if let Some((heading, heading_rate)) = in_earth {
-            yaw += heading;
-            yaw_rate += heading_rate.radians_per_second();
-        }
-        // The frame is told by the flags, so the type's frame is a formality here.
-        let attitude =
-            Attitude::<EarthFrame>::from_gimbal_angles(GimbalAngles { roll: pose.roll, pitch: pose.pitch, yaw });
-        let (delta_yaw, delta_yaw_velocity) = match (self.settings.status_frame, heading) {
-            (StatusFrame::Legacy, _) => (0.0, 0.0),
-            (_, Some((heading, rate))) => (heading.wrapped().radians() as f32, rate.radians_per_second() as f32),
-            (_, None) => (f32::NAN, f32::NAN),
-        };
-        GIMBAL_DEVICE_ATTITUDE_STATUS_DATA {
+        let status = AttitudeStatus {
             time_boot_ms: self.boot_ms(now),
-            q: attitude.to_wxyz(),
-            angular_velocity_x: pose.roll_rate.radians_per_second() as f32,
-            angular_velocity_y: pose.pitch_rate.radians_per_second() as f32,
-            angular_velocity_z: yaw_rate as f32,
-            failure_flags: self.failure_flags(now).bits(),
-            flags: self.flags(locked, heading.is_some(), in_earth.is_some()).bits(),
-            target_system: 0,
-            target_component: 0,
-            delta_yaw,
-            delta_yaw_velocity,
-            gimbal_device_id: 0,
-        }
+            pose,
+            yaw_from: in_earth,
+            delta_yaw: match self.settings.status_frame {
+                StatusFrame::Legacy => DeltaYaw::Unused,
+                StatusFrame::EarthWhenKnown | StatusFrame::FollowsLock => DeltaYaw::Told(heading),
+            },
+            flags: self.flags(locked, heading.is_some(), in_earth.is_some()),
+            failures: telling::with_own_failures(self.failures, self.plant.at_limit(), self.latch.manager(now)),
+            target: None,
+        };
+        status.message()
     }
 
     fn flags(&self, locked: bool, knows_heading: bool, in_earth: bool) -> GimbalFlags {
-        let mut flags = match self.steering.mode() {
-            // Retracted it does not stabilise.
-            Mode::Retract => GimbalFlags::RETRACT,
-            Mode::Neutral => GimbalFlags::NEUTRAL | GimbalFlags::ROLL_LOCK | GimbalFlags::PITCH_LOCK,
-            Mode::Free => GimbalFlags::ROLL_LOCK | GimbalFlags::PITCH_LOCK,
-        };
+        let mut flags = telling::mode_flags(self.steering.mode());
         flags.set(GimbalFlags::YAW_LOCK, locked);
         if self.settings.status_frame != StatusFrame::Legacy {
             flags.set(GimbalFlags::YAW_IN_EARTH_FRAME, in_earth);
@@ -150,16 +119,6 @@ impl Device {
             let accepts = accepts && self.settings.capabilities.contains(CapFlags::SUPPORTS_YAW_IN_EARTH_FRAME);
             flags.set(GimbalFlags::ACCEPTS_YAW_IN_EARTH_FRAME, accepts);
         }
-        flags
-    }
-
-    fn failure_flags(&self, now: Timestamp) -> FailureFlags {
-        let limit = self.plant.at_limit();
-        let mut flags = self.failures;
-        flags.set(FailureFlags::AT_ROLL_LIMIT, limit.roll);
-        flags.set(FailureFlags::AT_PITCH_LIMIT, limit.pitch);
-        flags.set(FailureFlags::AT_YAW_LIMIT, limit.yaw);
-        flags.set(FailureFlags::NO_MANAGER, self.latch.manager(now).is_none());
         flags
     }
 }
