@@ -1,4 +1,5 @@
 use super::*;
+use crate::geometry::{AxisLimits, GimbalAngles};
 
 fn degrees(value: f64) -> Angle {
     Angle::from_degrees(value)
