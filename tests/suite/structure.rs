@@ -83,6 +83,9 @@ fn sources(module: &str) -> Vec<(PathBuf, String)> {
     let mut waiting = vec![PathBuf::from(format!("src/{module}.rs")), PathBuf::from(format!("src/{module}"))];
     let mut files = Vec::new();
     while let Some(path) = waiting.pop() {
+        if path.ends_with("tests") {
+            continue;
+        }
         if let Ok(entries) = fs::read_dir(root.join(&path)) {
             waiting.extend(entries.map(|entry| path.join(entry.expect("a readable folder").file_name())));
         } else if path.extension().is_some_and(|extension| extension == "rs") && !path.ends_with("tests.rs") {

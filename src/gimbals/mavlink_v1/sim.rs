@@ -363,3 +363,6 @@ impl Component for Device {
         self.plant.set_platform(now, motion);
     }
 }
+
+#[cfg(test)]
+mod tests;
