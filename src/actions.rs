@@ -3,6 +3,7 @@
 
 mod danger;
 mod fields;
+mod reading;
 mod table;
 
 use std::fmt;

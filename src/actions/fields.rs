@@ -16,6 +16,34 @@ pub struct Field {
     pub required: bool,
 }
 
+/// A word of these, which must be there.
+pub const fn word(name: &'static str, about: &'static str, words: &'static [&'static str]) -> Field {
+    Field { name, about, kind: Kind::Word(words), required: true }
+}
+
+/// A number that may be left out, of either sign.
+pub const fn number(name: &'static str, about: &'static str, largest: f64) -> Field {
+    Field { name, about, kind: Kind::Number { min: -largest, max: largest }, required: false }
+}
+
+/// The same from 0.
+pub const fn positive(name: &'static str, about: &'static str, largest: f64) -> Field {
+    Field { name, about, kind: Kind::Number { min: 0.0, max: largest }, required: false }
+}
+
+/// A number on a scale of the gimbal's own, which is what its parameters can hold: 16 bits.
+pub const fn scale(name: &'static str, about: &'static str) -> Field {
+    positive(name, about, 32_767.0)
+}
+
+pub const fn required(field: Field) -> Field {
+    Field { required: true, ..field }
+}
+
+pub const fn optional(field: Field) -> Field {
+    Field { required: false, ..field }
+}
+
 /// What a field may be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {

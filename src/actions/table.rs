@@ -2,28 +2,14 @@
 
 use super::Action;
 use super::danger::{MOTORS_OFF, REBOOT, SHUTDOWN};
-use super::fields::{Field, Kind, Values, Wrong};
-use crate::geometry::{Angle, AngularRate, AxisLimits, YawFrame};
+use super::fields::{Field, Kind, Values, Wrong, number, optional, positive, required, scale, word};
+use super::reading::{AXIS, YAW_FRAME, axis, axis_motion, motor_control, operation, point, turn, words};
+use crate::geometry::{Angle, AxisLimits};
 use crate::gimbals::operation::{
-    Axis, AxisMotion, EncoderUnit, MotorAxis, MotorControl, Motors, Operation, RadioType, ResetMode, Restart, Stream,
-    StreamRate, YawMode,
+    EncoderUnit, Motors, Operation, RadioType, ResetMode, Restart, Stream, StreamRate, YawMode,
 };
 use crate::manager::asked::Asked;
-use crate::manager::request::AxisDemand;
 use crate::manager::roi::Datum;
-
-/// The names of all values of a kind, in their order.
-macro_rules! words {
-    ($kind:ty) => {{
-        let mut words = [""; <$kind>::ALL.len()];
-        let mut at = 0;
-        while at < words.len() {
-            words[at] = <$kind>::ALL[at].name();
-            at += 1;
-        }
-        words
-    }};
-}
 
 /// Everything that can be asked.
 pub const ACTIONS: &[Action] = &[
@@ -312,14 +298,6 @@ pub const ACTIONS: &[Action] = &[
 const RESET_MODES: [&str; ResetMode::ALL.len()] = words!(ResetMode);
 const RADIO_TYPES: [&str; RadioType::ALL.len()] = words!(RadioType);
 const STREAMS: [&str; Stream::ALL.len()] = words!(Stream);
-const AXES: [&str; Axis::ALL.len()] = words!(Axis);
-
-const YAW_FRAME: Field = optional(word(
-    "yaw_frame",
-    "what yaw counts from and is kept to: the nose (the default) or North",
-    &["vehicle", "earth"],
-));
-const AXIS: Field = word("axis", "pitch is tilt, yaw is pan", &AXES);
 
 /// One without fields.
 const fn plain(
@@ -335,119 +313,4 @@ const fn plain(
 const fn switch(path: &'static str, about: &'static str, read: fn(&Values) -> Result<Asked, Wrong>) -> Action {
     const ENABLED: &[Field] = &[Field { name: "enabled", about: "whether it does", kind: Kind::Flag, required: true }];
     Action { path, command: path, about, fields: ENABLED, danger: None, read }
-}
-
-const fn word(name: &'static str, about: &'static str, words: &'static [&'static str]) -> Field {
-    Field { name, about, kind: Kind::Word(words), required: true }
-}
-
-/// A number that may be left out, of either sign.
-const fn number(name: &'static str, about: &'static str, largest: f64) -> Field {
-    Field { name, about, kind: Kind::Number { min: -largest, max: largest }, required: false }
-}
-
-/// The same from 0.
-const fn positive(name: &'static str, about: &'static str, largest: f64) -> Field {
-    Field { name, about, kind: Kind::Number { min: 0.0, max: largest }, required: false }
-}
-
-/// A number on a scale of the gimbal's own, which is what its parameters can hold: 16 bits.
-const fn scale(name: &'static str, about: &'static str) -> Field {
-    positive(name, about, 32_767.0)
-}
-
-const fn required(field: Field) -> Field {
-    Field { required: true, ..field }
-}
-
-const fn optional(field: Field) -> Field {
-    Field { required: false, ..field }
-}
-
-#[expect(clippy::unnecessary_wraps, reason = "the rows of the table may fail")]
-fn operation(operation: Operation) -> Result<Asked, Wrong> {
-    Ok(Asked::Operation(operation))
-}
-
-fn yaw_frame(values: &Values) -> YawFrame {
-    if values.word("yaw_frame") == Some("earth") { YawFrame::Earth } else { YawFrame::Vehicle }
-}
-
-fn axis(values: &Values) -> Axis {
-    values.index("axis", &AXES).map_or(Axis::Tilt, |at| Axis::ALL[at])
-}
-
-fn needs_one(values: &Values, names: &[&'static str]) -> Result<(), Wrong> {
-    if names.iter().any(|name| values.has(name)) { Ok(()) } else { Err(Wrong::Nothing(names.to_vec())) }
-}
-
-fn point(values: &Values) -> Result<Asked, Wrong> {
-    needs_one(values, &["pitch_deg", "yaw_deg", "roll_deg"])?;
-    if !values.has("pitch_deg") && values.has("pitch_rate_dps") || !values.has("yaw_deg") && values.has("yaw_rate_dps")
-    {
-        return Err(Wrong::Together("a rate without an angle on its axis; to turn there is turn"));
-    }
-    let demand = |angle, rate| AxisDemand {
-        angle: values.number(angle).map(Angle::from_degrees),
-        rate: values.number(rate).map(AngularRate::from_degrees_per_second),
-    };
-    let yaw = demand("yaw_deg", "yaw_rate_dps");
-    Ok(Asked::Point {
-        roll: demand("roll_deg", ""),
-        pitch: demand("pitch_deg", "pitch_rate_dps"),
-        yaw: AxisDemand { angle: yaw.angle.map(Angle::wrapped), ..yaw },
-        yaw_frame: yaw_frame(values),
-    })
-}
-
-fn turn(values: &Values) -> Result<Asked, Wrong> {
-    needs_one(values, &["pitch_dps", "yaw_dps", "roll_dps"])?;
-    let rate = |name| values.number(name).map(AngularRate::from_degrees_per_second);
-    Ok(Asked::Turn {
-        roll: rate("roll_dps"),
-        pitch: rate("pitch_dps").unwrap_or(AngularRate::ZERO),
-        yaw: rate("yaw_dps").unwrap_or(AngularRate::ZERO),
-        yaw_frame: yaw_frame(values),
-    })
-}
-
-fn axis_motion(values: &Values) -> Result<Asked, Wrong> {
-    let motion = AxisMotion {
-        follow_speed: values.number("follow_speed"),
-        follow_smoothing: values.number("follow_smoothing"),
-        follow_window_deg: values.number("follow_window_deg"),
-        control_speed_dps: values.number("control_speed_dps"),
-        control_smoothing: values.number("control_smoothing"),
-        reversed: values.flag("reversed"),
-    };
-    if motion == AxisMotion::default() {
-        return Err(Wrong::Nothing(vec![
-            "follow_speed",
-            "follow_smoothing",
-            "follow_window_deg",
-            "control_speed_dps",
-            "control_smoothing",
-            "reversed",
-        ]));
-    }
-    operation(Operation::SetAxisMotion { axis: axis(values), motion })
-}
-
-fn motor_control(values: &Values) -> Result<Asked, Wrong> {
-    let axis = |stiffness, hold_strength| MotorAxis {
-        stiffness: values.number(stiffness),
-        hold_strength: values.number(hold_strength),
-    };
-    let motors = MotorControl {
-        tilt: axis("tilt_stiffness", "tilt_hold_strength"),
-        roll: axis("roll_stiffness", "roll_hold_strength"),
-        pan: axis("pan_stiffness", "pan_hold_strength"),
-        gyro_filter: values.number("gyro_filter"),
-        output_filter: values.number("output_filter"),
-        gain: values.number("gain"),
-    };
-    if motors == MotorControl::default() {
-        return Err(Wrong::Nothing(vec!["tilt_stiffness", "gyro_filter", "and the like"]));
-    }
-    operation(Operation::SetMotorControl(motors))
 }
