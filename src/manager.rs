@@ -17,12 +17,14 @@ pub mod voice;
 
 mod autopilot_client;
 mod commands;
+mod demands;
 mod device;
 mod given;
 mod heading;
 mod inquiries;
 mod mount;
 mod mount_reports;
+mod output;
 mod ownership;
 mod readiness;
 pub mod roi;
@@ -36,27 +38,25 @@ use std::time::Duration;
 use crate::channel::{ChannelId, ChannelSet};
 use crate::geometry::{Angle, Position};
 use crate::gimbals::capabilities::Capabilities;
-use crate::gimbals::operation::{Operation, OperationId};
 use crate::gimbals::report::{GimbalStatus, Identity};
-use crate::gimbals::setpoint::Setpoint;
 use crate::gimbals::settings::{Family, GimbalSettings};
 use crate::timestamp::Timestamp;
 use crate::vehicle::Vehicle;
-use crate::wire::dialect::MavMessage;
 use crate::wire::ids::GimbalFlags;
 use crate::wire::{MavId, Target};
 use autopilot_client::AutopilotClient;
 use commands::LastCommand;
-use control::{Control, Voice};
+use control::Control;
 use events::{Event, RatesEnd};
 use heading::HeadingBias;
 use intervals::{DEFAULT_STATUS_INTERVAL, Schedule};
 use messages::Interval;
 use mount::MountSenders;
 use mount_reports::MountReports;
+pub use output::ManagerOutput;
 use rank::Ranks;
 use readiness::ReadinessWatch;
-use request::{Demand, DemandKind, Refusal, Request};
+use request::Request;
 use rotation::Rotation;
 use settings::ControlSettings;
 use telling::can_aim;
@@ -85,52 +85,6 @@ pub struct Surroundings<'a> {
     pub overheard: bool,
     /// Whether the sender belongs to another vehicle, which never has a say.
     pub other_vehicle: bool,
-}
-
-/// What a manager wants done.
-#[derive(Clone, Debug, PartialEq)]
-pub enum ManagerOutput {
-    /// To be sent to where `to` is known, or else on the channel on which it asked.
-    Reply {
-        to: MavId,
-        channel: ChannelId,
-        message: Box<MavMessage>,
-    },
-    /// To be sent on the channel of the one who asked.
-    Answer {
-        channel: ChannelId,
-        message: Box<MavMessage>,
-    },
-    /// To be sent on these channels, or on all.
-    Broadcast {
-        channels: Option<ChannelSet>,
-        message: Box<MavMessage>,
-    },
-    /// The heartbeat was asked for, on these channels or on all.
-    Heartbeat {
-        channels: Option<ChannelSet>,
-    },
-    Steer(Setpoint),
-    /// The operation of that id was asked for by a command, which is answered once more when it is done.
-    Commanded {
-        id: OperationId,
-        commander: Commander,
-    },
-    /// For the driver; it answers.
-    Operate {
-        id: OperationId,
-        operation: Operation,
-    },
-    /// To be told back when the driver has been given the operation and what it says to that was heard.
-    Given {
-        id: OperationId,
-    },
-    /// The autopilot is to be asked for a message that it may never have sent.
-    AskAutopilot {
-        message_id: u32,
-    },
-    /// For whoever looks.
-    Event(Event),
 }
 
 /// How the gimbal is.
@@ -407,41 +361,6 @@ impl GimbalManager {
     /// Whether somebody holds primary or secondary control.
     pub fn is_held(&self) -> bool {
         self.control.primary().is_some() || self.control.secondary().is_some()
-    }
-
-    fn handle_demand(
-        &mut self,
-        now: Timestamp,
-        sender: MavId,
-        demand: &Demand,
-        around: Surroundings<'_>,
-    ) -> Result<(), Refusal> {
-        let voice = self.gate(now, sender, around)?;
-        let nudges =
-            matches!(voice, Voice::Second { .. }) && demand.is_rates_only() && self.tracking.can_be_nudged_by(sender);
-        if !nudges {
-            voice.needs_whole()?;
-        }
-        // Who only adds to it stops what it adds, and not what the primary wants.
-        if demand.is_stop() && !nudges && self.stop_unsteerable(now) {
-            return Ok(());
-        }
-        let capabilities = match self.capabilities.filter(|_| nudges && demand.is_stop()) {
-            Some(capabilities) => capabilities,
-            None => *self.steerable()?,
-        };
-        let demand = match demand.kind {
-            DemandKind::Manual => manual::scale(demand, &capabilities.limits, &self.settings),
-            DemandKind::Streamed | DemandKind::Commanded => *demand,
-        };
-        let situation = self.situation(now, &capabilities, around);
-        let timeouts = self.timeouts();
-        if nudges {
-            return self.tracking.nudge(now, sender, &demand, &situation, timeouts);
-        }
-        self.tracking.demand(now, sender, &demand, &situation, timeouts)?;
-        self.note_demand(now, sender);
-        Ok(())
     }
 
     fn timeouts(&self) -> RateTimeouts {

@@ -2,6 +2,7 @@
 //!
 //! Nothing is sent before the first demand, no change of frame moves the camera, and every rate ends by itself.
 
+mod aim;
 mod motion;
 mod nudge;
 mod radio_control;
@@ -18,9 +19,9 @@ use crate::gimbals::capabilities::Capabilities;
 use crate::gimbals::setpoint::{Pointing, Setpoint, Stabilised, Turning};
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
-use crate::wire::ids::CapFlags;
+use aim::Aim;
 pub use motion::SETTLE;
-use motion::{Motion, Point, Turn, clamp_yaw, way};
+use motion::{Point, Turn, clamp_yaw, way};
 use nudge::Nudge;
 use roi::Roi;
 use situation::Pose;
@@ -58,16 +59,6 @@ pub struct Tracking {
     let_go: Option<Timestamp>,
     /// It was left to its radio control until the next demand, by something else than a demand.
     left_to_radio_control: bool,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Aim {
-    Idle,
-    Retract,
-    Neutral,
-    Turn(Turn),
-    Point(Point),
-    Roi(Roi),
 }
 
 impl Tracking {
@@ -189,7 +180,7 @@ impl Tracking {
     pub fn end_roi(&mut self, now: Timestamp, source: MavId, capabilities: &Capabilities) -> bool {
         let was_active = matches!(self.aim, Aim::Roi(_));
         if was_active {
-            self.begin(now, source, neutral(capabilities));
+            self.begin(now, source, Aim::neutral(capabilities));
             self.nudge.handle_absolute(now, true, true);
         }
         was_active
@@ -200,41 +191,17 @@ impl Tracking {
         let nudged = self.nudge.moves();
         if nudged {
             self.nudge.stop();
+        }
+        let stopped = self.aim.stop_rates(now) || nudged;
+        if stopped {
             self.next = Some(now);
         }
-        let stopped = match &mut self.aim {
-            Aim::Turn(turn) if !turn.turning.is_zero() => {
-                turn.stop(now);
-                self.next = Some(now);
-                true
-            }
-            Aim::Point(point) => {
-                let mut stopped = false;
-                for axis in [&mut point.roll, &mut point.pitch, &mut point.yaw] {
-                    if matches!(axis.motion, Motion::Turning { .. }) {
-                        axis.motion = Motion::Still;
-                        stopped = true;
-                    }
-                }
-                if stopped {
-                    self.next = Some(now);
-                }
-                stopped
-            }
-            _ => false,
-        };
-        stopped || nudged
+        stopped
     }
 
     /// Whether the gimbal is told to turn on and on.
     pub fn is_rotating(&self) -> bool {
-        match &self.aim {
-            Aim::Turn(turn) => !turn.turning.is_zero(),
-            Aim::Point(point) => {
-                [point.roll, point.pitch, point.yaw].iter().any(|axis| matches!(axis.motion, Motion::Turning { .. }))
-            }
-            Aim::Idle | Aim::Retract | Aim::Neutral | Aim::Roi(_) => false,
-        }
+        self.aim.is_rotating()
     }
 
     /// The rotation that the device was told last and was not told to stop.
@@ -272,13 +239,8 @@ impl Tracking {
     /// More is known of how the vehicle is turned: where the setpoint follows it, the next one is due unless one has just
     /// been sent.
     pub fn handle_turned(&mut self, now: Timestamp, situation: &Situation<'_>) {
-        let follows = match &self.aim {
-            Aim::Roi(_) => situation.device_frame(YawFrame::Earth) != YawFrame::Earth,
-            Aim::Point(point) => situation.device_frame(point.frame) != point.frame,
-            Aim::Idle | Aim::Retract | Aim::Neutral | Aim::Turn(_) => false,
-        };
         let turned = situation.heading.is_some() && situation.heading != self.last_heading;
-        if follows && turned && now.since(self.last_at) >= self.period * 4 / 5 {
+        if self.aim.follows_vehicle(situation) && turned && now.since(self.last_at) >= self.period * 4 / 5 {
             self.next = Some(now);
         }
     }
@@ -349,32 +311,16 @@ impl Tracking {
 
     /// Whether yaw is held to North.
     pub fn is_locked(&self) -> bool {
-        match self.aim {
-            Aim::Idle | Aim::Retract | Aim::Neutral => false,
-            Aim::Turn(turn) => turn.turning.yaw_frame == YawFrame::Earth,
-            Aim::Point(point) => point.frame == YawFrame::Earth,
-            Aim::Roi(_) => true,
-        }
+        self.aim.is_locked()
     }
 
     pub fn roi(&self) -> Option<Position> {
-        match self.aim {
-            Aim::Roi(roi) => Some(roi.place),
-            _ => None,
-        }
+        self.aim.place()
     }
 
     /// `None` while nothing was demanded, else a word for people.
     pub fn mode(&self) -> Option<&'static str> {
-        match &self.aim {
-            Aim::Idle => None,
-            Aim::Retract => Some("retract"),
-            Aim::Neutral => Some("neutral"),
-            Aim::Turn(turn) if turn.turning.is_zero() => Some("hold"),
-            Aim::Turn(_) => Some("rate"),
-            Aim::Point(_) => Some("angle"),
-            Aim::Roi(_) => Some("roi"),
-        }
+        self.aim.name()
     }
 
     fn begin(&mut self, now: Timestamp, source: MavId, aim: Aim) {
@@ -476,12 +422,4 @@ impl Tracking {
         let frame = situation.device_frame(hold);
         adapt::to_device(setpoint, frame, situation.heading, &situation.capabilities.limits, yaw_now)
     }
-}
-
-fn neutral(capabilities: &Capabilities) -> Aim {
-    if capabilities.flags.contains(CapFlags::HAS_NEUTRAL) {
-        return Aim::Neutral;
-    }
-    let ahead = Pose { roll: Angle::ZERO, pitch: Angle::ZERO, yaw: Angle::ZERO };
-    Aim::Point(Point::still(ahead, YawFrame::Vehicle, Stabilised::BOTH))
 }

@@ -6,7 +6,7 @@
 
 use super::motion::{Axis, Motion, Point, Turn, clamp_yaw};
 use super::situation::{Pose, Situation};
-use super::{Aim, RateTimeouts, Tracking, neutral};
+use super::{Aim, RateTimeouts, Tracking};
 use crate::geometry::{Angle, AngularRate, Yaw, YawFrame};
 use crate::gimbals::adapt;
 use crate::gimbals::setpoint::{RadioControl, Setpoint, Stabilised, Turning, yaw_frame};
@@ -37,7 +37,7 @@ impl Tracking {
             return Ok(Some(Aim::Retract));
         }
         if flags.contains(GimbalFlags::NEUTRAL) {
-            return Ok(Some(neutral(capabilities)));
+            return Ok(Some(Aim::neutral(capabilities)));
         }
         let numbers = yaw_frame(flags).ok_or(Refusal::denied("both_yaw_frames"))?;
         let wanted =
