@@ -74,11 +74,10 @@ impl GimbalManager {
             | command::DO_GIMBAL_MANAGER_PITCHYAW
             | command::DO_SET_ROI_LOCATION
             | command::DO_SET_ROI_NONE
+            | command::DO_SET_ROI
             | command::DO_MOUNT_CONFIGURE
             | command::DO_MOUNT_CONTROL
             | command::DO_MOUNT_CONTROL_QUAT => self.handle_once(now, sender.id, command, around),
-            // Old ground stations say it to the autopilot; among managers it was superseded before there were any.
-            command::DO_SET_ROI if around.overheard => self.handle_once(now, sender.id, command, around),
             command::USER_1 | command::USER_2 | command::PREFLIGHT_REBOOT_SHUTDOWN
                 if command.is_directed() && !around.overheard =>
             {

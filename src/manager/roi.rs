@@ -1,10 +1,11 @@
-//! Regions of interest: `DO_SET_ROI_LOCATION` (195), `DO_SET_ROI_NONE` (197), and `DO_SET_ROI` (201) where it is overheard.
+//! Regions of interest: `DO_SET_ROI_LOCATION` (195), `DO_SET_ROI_NONE` (197), and
+//! `DO_SET_ROI` (201), which came before them.
 //!
 //! The altitude of a place counts from mean sea level or from home. A `COMMAND_INT` says which by its frame; any frame
 //! other than those is refused with result 9 rather than taken for one of them. A `COMMAND_LONG` does not say it, and
 //! is read as the autopilot's family does. 0, 0, 0 is no place but the end of the region of interest.
 
-use super::commands::Outcome;
+use super::commands::{Outcome, unsupported};
 use super::request::{Command, Form, Refusal};
 use super::settings::AltitudeReference;
 use super::{GimbalManager, Surroundings};
@@ -87,7 +88,7 @@ impl GimbalManager {
         Ok(())
     }
 
-    /// `DO_SET_ROI`, whose first parameter is a `MAV_ROI`.
+    /// `DO_SET_ROI`, whose first parameter is a `MAV_ROI`. What we do not look at is refused to who addressed exactly us.
     pub(super) fn do_set_roi(
         &mut self,
         now: Timestamp,
@@ -100,6 +101,7 @@ impl GimbalManager {
             Some(kind) if kind == f32::from(mav_roi::LOCATION) => {
                 self.do_set_roi_location(now, sender, command, around)?;
             }
+            _ if command.is_directed() && !around.overheard => return Err(unsupported(command.number)),
             _ => return Ok(Outcome::Ignored),
         }
         Ok(Outcome::Accepted)

@@ -42,7 +42,6 @@ fn items_128_and_138_what_we_do_not_do_is_refused_by_name() {
     let named = [
         (196,    UNSUPPORTED, "do_set_roi_wpnext_offset_unsupported"),
         (198,    UNSUPPORTED, "do_set_roi_sysid_unsupported"),
-        (201,    UNSUPPORTED, "do_set_roi_unsupported"),
         (246,    DENIED,      "preflight_reboot_shutdown_denied"),
         (1002,   UNSUPPORTED, "do_gimbal_manager_track_rectangle_unsupported"),
         (32_100, UNSUPPORTED, "request_operator_control_unsupported"),

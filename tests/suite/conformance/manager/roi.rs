@@ -16,10 +16,10 @@ use super::{
     setpoints, with_gimbal, with_gimbal_that,
 };
 use crate::support::script::{
-    ACCEPTED, DENIED, FAILED, NAN, TEMPORARILY_REJECTED, UNSUPPORTED_MAV_FRAME, ardupilot_heartbeat, command_int,
-    command_long, device_information, device_status, gimbal_heartbeat, global_position, in_frame, pitch_yaw_deg,
-    pitchyaw, px4_heartbeat, quaternion, roi_location, set_attitude, set_manual_control, set_pitchyaw, take_control,
-    usual_capabilities,
+    ACCEPTED, DENIED, FAILED, NAN, TEMPORARILY_REJECTED, UNSUPPORTED, UNSUPPORTED_MAV_FRAME, ardupilot_heartbeat,
+    command_int, command_long, device_information, device_status, gimbal_heartbeat, global_position, in_frame,
+    pitch_yaw_deg, pitchyaw, px4_heartbeat, quaternion, roi_location, set_attitude, set_manual_control, set_pitchyaw,
+    take_control, usual_capabilities,
 };
 use crate::support::wire::hex;
 use crate::support::world::{AUTOPILOT, GCS, GIMBAL, MANAGER, Places, World, three_links};
@@ -317,6 +317,48 @@ fn items_122_and_123_a_region_of_interest_ends_in_neutral() {
     let (pitch, yaw) = pitch_yaw_deg(setpoint.q);
     assert_near(pitch, (-0.2_f64).to_degrees(), 0.001);
     assert_near(yaw, 0.3_f64.to_degrees(), 0.001);
+}
+
+/// "When 201 with MAV_ROI 0 arrives it acts like 197; with 3 like 195." To us and to everybody in our system.
+/// Protocol notes 2.6: "201: map MAV_ROI 0→197, 3→195, 4→198, 1→196, 2→UNSUPPORTED."
+#[test]
+fn item_126_the_command_of_old_ground_stations_is_taken_as_its_successors() {
+    let [latitude, longitude] = BELOW.map(|degrees| degrees as f32);
+    let integers = BELOW.map(|degrees| (degrees * 1e7).round() as i32);
+    for target in [MANAGER, MavId::new(1, 0)] {
+        let location = command_int(target, 201, [3.0, 0.0, 0.0, 0.0], integers[0], integers[1], 388.0);
+        for look in [
+            command_long(target, 201, &[3.0, 0.0, 0.0, 0.0, latitude, longitude, 388.0]),
+            in_frame(0, location.clone()),
+            in_frame(5, location),
+        ] {
+            let (mut world, places) = with_gimbal();
+            fly(&mut world, places, FIELD, 0.0);
+            assert_eq!(world.result_of(places.ground, GCS, &look), Some(ACCEPTED), "{look:?}");
+            let (pitch, yaw) = pitch_yaw_deg(only_setpoint(&mut world, places).q);
+            assert_near(pitch, -36.653, 0.05);
+            assert_near(yaw, 34.176, 0.05);
+            world.forget();
+            let none = command_long(target, 201, &[0.0; 7]);
+            assert_eq!(world.result_of(places.ground, GCS, &none), Some(ACCEPTED));
+            let setpoint = only_setpoint(&mut world, places);
+            assert!(setpoint.flags == 2 | 44 && is_nan(&setpoint.q), "{setpoint:?}");
+        }
+        // The rest is refused to who asked exactly us, and moves nothing.
+        let (mut world, places) = with_gimbal();
+        fly(&mut world, places, FIELD, 0.0);
+        world.forget();
+        for kind in [1.0, 2.0, 4.0, 5.0, NAN] {
+            let other = command_long(target, 201, &[kind, 1.0, 0.0, 0.0, latitude, longitude, 388.0]);
+            let answer = if target == MANAGER { Some(UNSUPPORTED) } else { None };
+            assert_eq!(world.result_of(places.ground, GCS, &other), answer, "{target} {kind}");
+        }
+        assert_eq!(setpoints(&mut world, places), []);
+        assert_eq!(world.snapshot().gimbals[0].primary, None);
+        let rejected = world.snapshot().gimbals[0].rejected.get("255/190").cloned().unwrap_or_default();
+        let counted = if target == MANAGER { Some(&5) } else { None };
+        assert_eq!(rejected.get("do_set_roi_unsupported"), counted, "{rejected:?}");
+    }
 }
 
 /// "When 287 from the primary arrives during ROI, ROI is cancelled." So do the others, and zero rates, which are how some
