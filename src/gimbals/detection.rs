@@ -20,7 +20,7 @@ use super::operation::{Operation, OperationId};
 use super::report::Report;
 use super::setpoint::{Setpoint, Turning};
 use super::settings::{Family, GimbalSettings};
-use crate::geometry::AngularRate;
+use crate::geometry::{Angle, AngularRate};
 use crate::timers::TimerTable;
 use crate::timestamp::Timestamp;
 use crate::wire::dialect::{COMMAND_LONG_DATA, MavMessage};
@@ -281,6 +281,12 @@ impl GimbalDriver for Detection {
             other.handle_received(now, frame);
         }
         self.collect();
+    }
+
+    fn handle_vehicle_heading(&mut self, heading: Option<Angle>) {
+        if let Some(other) = &mut self.other {
+            other.handle_vehicle_heading(heading);
+        }
     }
 
     fn handle_link_lost(&mut self) {

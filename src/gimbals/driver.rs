@@ -5,6 +5,7 @@ use super::operation::{Operation, OperationId, OperationResult};
 use super::report::Report;
 use super::setpoint::Setpoint;
 use super::settings::Family;
+use crate::geometry::Angle;
 use crate::timestamp::Timestamp;
 use crate::wire::dialect::{COMMAND_LONG_DATA, MavMessage};
 use crate::wire::{Frame, MavId};
@@ -21,6 +22,10 @@ pub trait GimbalDriver: std::fmt::Debug {
 
     /// A frame that the device sent, but for what it answers to others.
     fn handle_received(&mut self, now: Timestamp, frame: &Frame<'_>);
+
+    /// Where the vehicle's nose points, where that is known, from North; told before each frame while the gimbal may be
+    /// turning.
+    fn handle_vehicle_heading(&mut self, _heading: Option<Angle>) {}
 
     /// The link to the device is gone, and the device with it.
     fn handle_link_lost(&mut self);

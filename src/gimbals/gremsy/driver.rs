@@ -27,12 +27,13 @@ use std::time::Duration;
 use super::config::GremsySettings;
 use super::readings::{Encoders, Negated, Orientation, RawImu};
 use super::status::{SystemStatus, read_system_status};
+use crate::geometry::Angle;
 use crate::gimbals::boot_clock::BootClock;
 use crate::gimbals::capabilities::Capabilities;
 use crate::gimbals::details::GimbalDetails;
 use crate::gimbals::driver::{CommandOutcome, DriverOutput, GimbalDriver};
-use crate::gimbals::gremsy::is_vendor;
 use crate::gimbals::gremsy::parameters::{Axis, EncoderType, Parameter, ParameterTable};
+use crate::gimbals::gremsy::{is_vendor, packet};
 use crate::gimbals::mavlink_v2::MavlinkV2Driver;
 use crate::gimbals::mavlink_v2::packet::{DeviceInformation, read_information};
 use crate::gimbals::operation::{Operation, OperationId};
@@ -104,18 +105,32 @@ pub struct GremsyDriver {
     readiness: Option<Readiness>,
     /// That it starts was reported, or is no news.
     is_start_told: bool,
-    /// Its radio receiver was given the gimbal.
-    is_handed_over: bool,
+    hand_over: HandOver,
+    /// It was told to retract, which is a place to stow.
+    is_to_be_stowed: bool,
     operations: Operations,
     /// It is being told another unit for its encoders, and may send either.
     unit_change: Option<OperationId>,
     heard: Heard,
     vehicle_turn: VehicleTurn,
+    /// What the autopilot says of it while the gimbal may be turning.
+    vehicle_heading: Option<Angle>,
     negated: Negated,
     effect: EffectWatch,
     faults: Faults,
     timers: TimerTable<Timer>,
     outputs: VecDeque<DriverOutput>,
+}
+
+/// Whether it was given to its radio receiver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum HandOver {
+    No,
+    Asked,
+    /// It acknowledged that.
+    Done,
+    /// Nobody asks it again before something else was asked of it.
+    Refused,
 }
 
 /// The latest of everything that it tells.
@@ -174,11 +189,13 @@ impl GremsyDriver {
             hand_over_waits: false,
             readiness: None,
             is_start_told: true,
-            is_handed_over: false,
+            hand_over: HandOver::No,
+            is_to_be_stowed: false,
             operations: Operations::default(),
             unit_change: None,
             heard: Heard::default(),
             vehicle_turn: VehicleTurn::default(),
+            vehicle_heading: None,
             negated: settings.negated(),
             effect: EffectWatch::default(),
             faults: Faults::default(),
@@ -316,6 +333,10 @@ impl GimbalDriver for GremsyDriver {
         self.go_on(now);
     }
 
+    fn handle_vehicle_heading(&mut self, heading: Option<Angle>) {
+        self.vehicle_heading = heading;
+    }
+
     fn handle_link_lost(&mut self) {
         self.v2.handle_link_lost();
         while self.v2.poll_output().is_some() {}
@@ -347,6 +368,10 @@ impl GimbalDriver for GremsyDriver {
             && self.search.decided().is_none()
         {
             self.search.handle_refusal();
+        }
+        let asked = COMMAND_LONG_DATA { confirmation: 0, ..command.clone() };
+        if asked == packet::hand_to_rc(device) && self.hand_over == HandOver::Asked {
+            self.hand_over = if is_done { HandOver::Done } else { HandOver::Refused };
         }
         self.mount.handle_outcome(now, device, command, is_done);
         self.handle_operation_outcome(now, command, outcome);
@@ -387,7 +412,7 @@ impl GimbalDriver for GremsyDriver {
         let mode_change = self.mode_change.map(|change| change.poll_timeout());
         let mount = self.mount.poll_timeout(self.condition());
         let rest = [self.v2.poll_timeout(), self.parameters.poll_timeout(), self.operations.poll_timeout()];
-        let stopping = self.stopping.map(|stopping| stopping.poll_timeout());
+        let stopping = self.stopping.and_then(|stopping| stopping.poll_timeout());
         [timer, search, mode_change, mount, stopping].into_iter().chain(rest).flatten().min()
     }
 

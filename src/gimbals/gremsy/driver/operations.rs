@@ -3,7 +3,7 @@
 use super::mode_change::ModeChange;
 use super::streams;
 use super::writes;
-use super::{Generation, GremsyDriver};
+use super::{Generation, GremsyDriver, HandOver};
 use crate::geometry::{Angle, Attitude, EarthFrame, GimbalAngles, VehicleFrame, Yaw};
 use crate::gimbals::driver::{CommandOutcome, DriverOutput, GimbalDriver};
 use crate::gimbals::gremsy::modes::ControlMode;
@@ -169,7 +169,7 @@ impl GremsyDriver {
             },
             Operation::RadioControl => {
                 self.mount.forget_mode();
-                self.is_handed_over = true;
+                self.hand_over = HandOver::Asked;
                 self.ask(now, id, packet::hand_to_rc(device), Goal::Answer);
             }
             Operation::Restart(Restart::Reboot) => {

@@ -6,7 +6,7 @@ use super::mode_change::{self, ModeChange};
 use super::mount::{Condition, DEAD_MAN, MountOutput, Order};
 use super::operations::MOTORS_SHOW_WITHIN;
 use super::stopping::Stopping;
-use super::{Generation, GremsyDriver, Timer};
+use super::{Generation, GremsyDriver, HandOver, Timer};
 use crate::geometry::{Angle, AngularRate, GimbalAngles, Yaw, YawFrame};
 use crate::gimbals::driver::{DriverOutput, GimbalDriver};
 use crate::gimbals::gremsy::modes::{self, ControlMode};
@@ -31,6 +31,7 @@ impl GremsyDriver {
     pub(super) fn steer(&mut self, now: Timestamp, setpoint: Setpoint) {
         let Some(device) = self.device else { return };
         let is_stop = matches!(setpoint, Setpoint::Turn(turning) if turning.is_zero());
+        self.is_to_be_stowed = setpoint == Setpoint::Retract && !self.settings.retract_allowed;
         let setpoint = self.within_policy(setpoint);
         // One that is not heard may still hear that it is to stop.
         if !self.is_alive && !is_stop {
@@ -40,7 +41,9 @@ impl GremsyDriver {
         match self.search.decided() {
             Some(Generation::V1) => {
                 let order = order_of(self.about_north(now, setpoint));
-                self.is_handed_over &= order == Order::RadioControl;
+                if order != Order::RadioControl {
+                    self.hand_over = HandOver::No;
+                }
                 self.mount.order(now, order);
                 self.mount.advance(now, device, self.condition());
             }
@@ -104,10 +107,10 @@ impl GremsyDriver {
         }
         if let Setpoint::Point(Pointing { radio_control: RadioControl::Exclusive, .. }) = setpoint {
             self.stop_v2(now);
-            self.hand_over_waits = !self.is_handed_over;
+            self.hand_over_waits = self.hand_over == HandOver::No;
             return;
         }
-        self.is_handed_over = false;
+        self.hand_over = HandOver::No;
         self.hand_over_waits = false;
         match self.mode_change {
             // It is to move, and its motors are being switched on, for that or by name: what it is told waits for them.
@@ -156,7 +159,13 @@ impl GremsyDriver {
                     stopping.handle_sent(now, self.is_alive);
                 }
             }
-            _ => (self.turning, self.stopping) = (None, None),
+            // What it turns at is not over because something else is said: that may be lost.
+            _ => {
+                self.stop_v2(now);
+                if let Some(stopping) = &mut self.stopping {
+                    stopping.replace();
+                }
+            }
         }
         self.v2.handle_setpoint(now, setpoint);
     }
@@ -165,6 +174,8 @@ impl GremsyDriver {
     pub(super) fn stop_v2(&mut self, now: Timestamp) {
         if let Some(turning) = self.turning.take() {
             self.stopping = Some(Stopping::new(now, turning));
+        } else if let Some(stopping) = &mut self.stopping {
+            stopping.go_on(now);
         }
     }
 
@@ -179,7 +190,7 @@ impl GremsyDriver {
         }
         if self.hand_over_waits && self.stopping.is_none() {
             self.hand_over_waits = false;
-            self.is_handed_over = true;
+            self.hand_over = HandOver::Asked;
             self.outputs.push_back(DriverOutput::Command(Box::new(packet::hand_to_rc(device))));
         }
     }
@@ -294,7 +305,9 @@ impl GremsyDriver {
                 MountOutput::Send(command) => self.send_command(command),
                 MountOutput::Command(command) => {
                     let target = MavId::new(command.target_system, command.target_component);
-                    self.is_handed_over |= command == packet::hand_to_rc(target);
+                    if command == packet::hand_to_rc(target) {
+                        self.hand_over = HandOver::Asked;
+                    }
                     self.outputs.push_back(DriverOutput::Command(Box::new(command)));
                 }
                 MountOutput::ModeRefused => self.raise(Fault::ModeRefused),

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use crate::geometry::{Angle, Yaw};
+use crate::geometry::{Angle, AngularRate, Yaw, YawFrame};
 use crate::gimbals::heard_time::HeardTime;
 use crate::gimbals::setpoint::{Setpoint, Turning};
 use crate::timestamp::Timestamp;
@@ -18,24 +18,92 @@ const TURNS_WITHIN: Duration = Duration::from_millis(250);
 /// … and it turns on when that is so much of what it was told, and not slower than it may creep at rest, degrees per second.
 const TURNS_ON: f64 = 0.5;
 const CREEPS_DPS: f64 = 1.0;
-/// What turns for longer, although it is told to stop, does so for another reason, such as its vehicle.
+/// What seems to turn for longer, although it is told to stop, may do so for another reason, such as its vehicle.
 const MAY_TURN_ON_FOR: Duration = Duration::from_secs(10);
+
+/// Its own rotation is told from its vehicle's by what both come to in so long: the heading may come twice a second only.
+const JUDGED_OVER: Duration = Duration::from_secs(8);
+
+/// Where it looks.
+#[derive(Clone, Copy, Debug)]
+pub struct Look {
+    pub pitch: Angle,
+    pub yaw: Yaw,
+    /// The vehicle's heading, where it is known.
+    pub heading: Option<Angle>,
+}
+
+impl Look {
+    fn yaw_in(self, frame: YawFrame) -> Option<Angle> {
+        match (self.yaw, self.heading) {
+            (yaw, _) if yaw.frame() == frame => Some(yaw.angle()),
+            (Yaw::InVehicleFrame(yaw), heading) => heading.map(|heading| yaw + heading),
+            (Yaw::InEarthFrame(yaw), heading) => heading.map(|heading| yaw - heading),
+        }
+    }
+}
+
+/// How far yaw has turned since a moment, degrees; `None` in a frame that was not known all the time.
+#[derive(Clone, Copy, Debug)]
+struct Turned {
+    since: Timestamp,
+    from_nose: Option<f64>,
+    over_ground: Option<f64>,
+}
+
+impl Turned {
+    const fn new(since: Timestamp) -> Self {
+        Self { since, from_nose: Some(0.0), over_ground: Some(0.0) }
+    }
+
+    fn add(&mut self, from_nose: Option<f64>, over_ground: Option<f64>) {
+        let sum = |before: Option<f64>, more: Option<f64>| Some(before? + more?);
+        self.from_nose = sum(self.from_nose, from_nose);
+        self.over_ground = sum(self.over_ground, over_ground);
+    }
+}
 
 /// A rotation that is being stopped.
 #[derive(Clone, Copy, Debug)]
 pub struct Stopping {
     turning: Turning,
+    /// It is told something else than zeros, which stops it as well.
+    is_replaced: bool,
     next: Timestamp,
     heard: HeardTime,
     begun: Timestamp,
     /// Where it looked, and when.
-    looked: Option<(Timestamp, Angle, Yaw)>,
+    looked: Option<(Timestamp, Look)>,
+    turned: Turned,
+    /// It turned from the nose and over ground when that was last judged: one that rests does so in one of them.
+    turns_by_itself: bool,
 }
 
 impl Stopping {
     /// The first zero is due at once.
     pub fn new(now: Timestamp, turning: Turning) -> Self {
-        Self { turning, next: now, heard: HeardTime::new(now), begun: now, looked: None }
+        Self {
+            turning,
+            is_replaced: false,
+            next: now,
+            heard: HeardTime::new(now),
+            begun: now,
+            looked: None,
+            turned: Turned::new(now),
+            turns_by_itself: false,
+        }
+    }
+
+    /// Something else is told it in the place of its rotation, again and again.
+    pub fn replace(&mut self) {
+        self.is_replaced = true;
+    }
+
+    /// Nothing is told it any more but zeros.
+    pub fn go_on(&mut self, now: Timestamp) {
+        if std::mem::take(&mut self.is_replaced) {
+            self.next = now;
+        }
     }
 
     /// A zero was sent to a gimbal that is there or not.
@@ -50,31 +118,47 @@ impl Stopping {
     }
 
     /// It tells where it looks.
-    pub fn handle_report(&mut self, now: Timestamp, pitch: Angle, yaw: Yaw) {
-        let Some((at, pitch_before, yaw_before)) = self.looked.filter(|(_, _, before)| before.frame() == yaw.frame())
-        else {
-            self.looked = Some((now, pitch, yaw));
+    pub fn handle_report(&mut self, now: Timestamp, look: Look) {
+        let Some((at, before)) = self.looked.filter(|(_, before)| before.yaw.frame() == look.yaw.frame()) else {
+            self.looked = Some((now, look));
+            self.turned = Turned::new(now);
             return;
         };
         let passed = now.since(at);
         if passed < TURNS_WITHIN {
             return;
         }
-        self.looked = Some((now, pitch, yaw));
-        let turned = [pitch - pitch_before, (yaw.angle() - yaw_before.angle()).wrapped()];
-        let turns_on = turned.into_iter().zip([self.turning.pitch, self.turning.yaw]).any(|(turned, told)| {
-            let told = told.degrees_per_second();
-            let rate = turned.degrees() / passed.as_secs_f64() * told.signum();
-            told != 0.0 && rate >= CREEPS_DPS.max(told.abs() * TURNS_ON)
-        });
-        if turns_on && now.since(self.begun) < MAY_TURN_ON_FOR {
+        self.looked = Some((now, look));
+        let turned = |frame| Some((look.yaw_in(frame)? - before.yaw_in(frame)?).wrapped().degrees());
+        let (from_nose, over_ground) = (turned(YawFrame::Vehicle), turned(YawFrame::Earth));
+        self.turned.add(from_nose, over_ground);
+        self.judge(now);
+        let pitched = (look.pitch - before.pitch).degrees();
+        let yawed = match self.turning.yaw_frame {
+            YawFrame::Vehicle => from_nose.or(over_ground),
+            YawFrame::Earth => over_ground.or(from_nose),
+        };
+        // Pitch is over ground, and no vehicle turns it.
+        let turns_on = as_told(self.turning.pitch, pitched, passed)
+            || yawed.is_some_and(|yawed| as_told(self.turning.yaw, yawed, passed))
+                && (self.turns_by_itself || now.since(self.begun) < MAY_TURN_ON_FOR);
+        if turns_on {
             self.heard = HeardTime::new(now);
+        }
+    }
+
+    fn judge(&mut self, now: Timestamp) {
+        let passed = now.since(self.turned.since);
+        if passed >= JUDGED_OVER {
+            let Turned { from_nose, over_ground, .. } = std::mem::replace(&mut self.turned, Turned::new(now));
+            let is_told = |turned: Option<f64>| turned.is_some_and(|turned| as_told(self.turning.yaw, turned, passed));
+            self.turns_by_itself = is_told(from_nose) && is_told(over_ground);
         }
     }
 
     /// The zero that is due.
     pub fn handle_timeout(&mut self, now: Timestamp, is_there: bool) -> Option<Setpoint> {
-        if now < self.next {
+        if self.is_replaced || now < self.next {
             return None;
         }
         self.handle_sent(now, is_there);
@@ -85,15 +169,20 @@ impl Stopping {
         self.heard.passed() >= LASTS
     }
 
-    pub const fn poll_timeout(&self) -> Timestamp {
-        self.next
+    pub fn poll_timeout(&self) -> Option<Timestamp> {
+        Some(self.next).filter(|_| !self.is_replaced)
     }
+}
+
+/// Whether what turned by so many degrees in a time turns as it was told.
+fn as_told(told: AngularRate, turned: f64, passed: Duration) -> bool {
+    let told = told.degrees_per_second();
+    told != 0.0 && turned / passed.as_secs_f64() * told.signum() >= CREEPS_DPS.max(told.abs() * TURNS_ON)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::AngularRate;
 
     /// When it is over, in milliseconds; reports come twenty times a second and every zero is sent.
     fn stopped_after(told_dps: f64, yaw_at: impl Fn(f64) -> f64) -> Option<u64> {
@@ -104,7 +193,29 @@ mod tests {
             stopping.handle_timeout(now, true);
             stopping.handle_heard(now);
             let yaw = Angle::from_degrees(yaw_at(*millis as f64 / 1000.0));
-            stopping.handle_report(now, Angle::ZERO, Yaw::InVehicleFrame(yaw));
+            stopping.handle_report(now, Look { pitch: Angle::ZERO, yaw: Yaw::InVehicleFrame(yaw), heading: None });
+            stopping.is_over()
+        })
+    }
+
+    /// When one is over that was told to turn to the right by 5 degrees per second and does so for as long as is given, and
+    /// whose vehicle turns.
+    fn stopped_over_ground(reports: YawFrame, vehicle_dps: f64, turns_for: f64) -> Option<u64> {
+        let turning = Turning { yaw: AngularRate::from_degrees_per_second(5.0), ..Turning::STOPPED };
+        let mut stopping = Stopping::new(Timestamp::ZERO, turning);
+        (50..=60_000).step_by(50).find(|millis| {
+            let (now, seconds) = (Timestamp::from_millis(*millis), *millis as f64 / 1000.0);
+            stopping.handle_timeout(now, true);
+            stopping.handle_heard(now);
+            // It comes twice a second.
+            let heading = Angle::from_degrees(vehicle_dps * (seconds * 2.0).floor() / 2.0).wrapped();
+            // Once stopped, it keeps its direction over ground.
+            let turned = 5.0 * seconds.min(turns_for);
+            let yaw = match reports {
+                YawFrame::Earth => Yaw::InEarthFrame(Angle::from_degrees(turned).wrapped()),
+                YawFrame::Vehicle => Yaw::InVehicleFrame(Angle::from_degrees(turned - vehicle_dps * seconds).wrapped()),
+            };
+            stopping.handle_report(now, Look { pitch: Angle::ZERO, yaw, heading: Some(heading) });
             stopping.is_over()
         })
     }
@@ -126,5 +237,21 @@ mod tests {
     #[test]
     fn what_turns_on_for_long_is_not_waited_for() {
         assert!(stopped_after(5.0, |seconds| 5.0 * seconds).is_some_and(|millis| (10_700..=11_200).contains(&millis)));
+    }
+
+    /// Where it is known how the vehicle turns, a rotation is told from one of the vehicle, and is stopped however long
+    /// nothing arrives.
+    #[test]
+    fn what_turns_from_the_nose_and_over_ground_is_told_to_stop_until_it_does() {
+        for reports in [YawFrame::Vehicle, YawFrame::Earth] {
+            for vehicle_dps in [-4.0, 0.0, 2.0] {
+                let over = stopped_over_ground(reports, vehicle_dps, 40.0);
+                assert!(over.is_some_and(|millis| millis >= 40_700), "{reports:?} {vehicle_dps} {over:?}");
+            }
+            // Stopped, with a vehicle that makes it look as if it turned from the nose.
+            let over = stopped_over_ground(reports, -5.0, 0.0);
+            assert!(over.is_some_and(|millis| (10_400..=11_500).contains(&millis)), "{reports:?} {over:?}");
+            assert_eq!(stopped_over_ground(reports, 5.0, 0.0), Some(1_000), "{reports:?}");
+        }
     }
 }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::faults::Fault;
-use super::{Generation, GremsyDriver, Heard, LOST_AFTER, TICK, Timer, operations};
+use super::{Generation, GremsyDriver, HandOver, Heard, LOST_AFTER, TICK, Timer, operations};
 use crate::gimbals::driver::DriverOutput;
 use crate::gimbals::gremsy::status::{Activity, SystemStatus};
 use crate::gimbals::operation::OperationError;
@@ -37,7 +37,7 @@ impl GremsyDriver {
     /// It was started again, by whomever.
     pub(super) fn restart(&mut self, now: Timestamp, device: MavId) {
         self.mount.handle_restart();
-        self.is_handed_over = false;
+        self.hand_over = HandOver::No;
         self.effect.forget();
         self.heard.clock.forget();
         self.begin(now, device);
@@ -49,7 +49,7 @@ impl GremsyDriver {
     /// It does what it was told, and nothing that it was told before holds.
     pub(super) fn switch_off(&mut self, now: Timestamp, comes_back: bool) {
         self.off = Some(Off { since: now, comes_back });
-        self.is_handed_over = false;
+        self.hand_over = HandOver::No;
         self.mount.handle_lost();
         self.end_moves();
         self.forget_rotation();
@@ -129,7 +129,7 @@ impl GremsyDriver {
         self.is_present = false;
         self.mount.handle_lost();
         self.end_moves();
-        self.is_handed_over = false;
+        self.hand_over = HandOver::No;
         self.effect.forget();
         self.heard = Heard::default();
         for id in self.operations.clear() {

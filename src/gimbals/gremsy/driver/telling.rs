@@ -4,7 +4,8 @@ use super::effect::{Finding, Pose};
 use super::faults::Fault;
 use super::mount::Order;
 use super::operations::{attitude_of, shown_mode};
-use super::{Generation, GremsyDriver};
+use super::stopping::Look;
+use super::{Generation, GremsyDriver, HandOver};
 use crate::geometry::{Angle, AxisLimits, Limits, Yaw};
 use crate::gimbals::capabilities::Capabilities;
 use crate::gimbals::driver::DriverOutput;
@@ -46,9 +47,10 @@ impl GremsyDriver {
             Yaw::InEarthFrame(_) => GimbalFlags::YAW_IN_EARTH_FRAME,
         };
         let motors_off = self.heard.status.is_some_and(|(_, status)| !status.motors_on());
-        flags.set(GimbalFlags::RETRACT, motors_off || self.mount.wanted() == Some(Order::Retract));
+        let is_stowed = self.is_to_be_stowed && matches!(self.mount.wanted(), Some(Order::Point { .. }));
+        flags.set(GimbalFlags::RETRACT, motors_off || is_stowed || self.mount.wanted() == Some(Order::Retract));
         flags.set(GimbalFlags::NEUTRAL, self.mount.wanted() == Some(Order::Home));
-        flags.set(GimbalFlags::RC_EXCLUSIVE, self.is_handed_over);
+        flags.set(GimbalFlags::RC_EXCLUSIVE, self.hand_over == HandOver::Done);
         self.tell_attitude(
             now,
             GimbalStatus {
@@ -100,7 +102,8 @@ impl GremsyDriver {
         self.outputs.push_back(DriverOutput::Report(Report::Attitude(status)));
         let pose = Pose { pitch: status.attitude.angles().pitch, yaw: status.attitude.yaw() };
         if let Some(stopping) = &mut self.stopping {
-            stopping.handle_report(now, pose.pitch, pose.yaw);
+            let heading = self.vehicle_heading;
+            stopping.handle_report(now, Look { pitch: pose.pitch, yaw: pose.yaw, heading });
         }
         let limits = FailureFlags::AT_PITCH_LIMIT | FailureFlags::AT_YAW_LIMIT | FailureFlags::AT_ROLL_LIMIT;
         if self.heard.status.is_some_and(|(_, status)| !status.motors_on()) {

@@ -6,8 +6,11 @@ use gimbald::gimbals::gremsy::packet;
 use gimbald::gimbals::mavlink_v2;
 use gimbald::gimbals::setpoint::{RadioControl, Setpoint, Stabilised, Turning};
 use gimbald::wire::FrameBuffer;
-use gimbald::wire::dialect::MavMessage;
-use gimbald::wire::ids::GimbalFlags;
+use gimbald::wire::dialect::{
+    COMMAND_ACK_DATA, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_MANAGER_STATUS_DATA, MOUNT_ORIENTATION_DATA,
+    MavMessage,
+};
+use gimbald::wire::ids::{CommandResult, GimbalFlags};
 
 use super::*;
 use crate::support::script::{NAN, quaternion, set_attitude, set_pitchyaw};
@@ -272,6 +275,12 @@ fn statement_30_retract_is_a_place_to_stow_unless_it_is_allowed() {
         let (commands, setpoints) = orders(&mut world, places);
         assert!(commands.iter().all(|command| command.command != command::USER_1), "{commands:?}");
         assert!(setpoints.iter().all(|setpoint| setpoint.flags & 1 == 0));
+        // Client checklist E49: "RETRACT bit in 285 while retracted; cleared by the next angle command." What a v2 gimbal says
+        // of itself goes by untouched (D2), and its flag means that the motors are off; the manager's 281 has it.
+        assert_eq!(told_retracted(&mut world, places), (generation == Generation::V1, true), "{generation:?}");
+        demand(&mut world, places, [-10.0, 20.0, NAN, NAN, 0.0]);
+        run(&mut world, places, 2 * SECOND);
+        assert_eq!(told_retracted(&mut world, places), (false, false), "{generation:?}");
 
         // Allowed, it switches them off, and the next angle on again.
         let allowed = GremsySettings { retract_allowed: true, ..stow };
@@ -284,6 +293,18 @@ fn statement_30_retract_is_a_place_to_stow_unless_it_is_allowed() {
         assert_eq!(seen(&world).details.motors_on, Some(true), "{generation:?}");
         assert_looks(&world, -10.0, 20.0);
     }
+}
+
+/// Whether a ground station has RETRACT in the latest 285 and 281.
+fn told_retracted(world: &mut World, places: Places) -> (bool, bool) {
+    let arrivals = world.arrivals(places.ground).iter();
+    let mut statuses =
+        arrivals.clone().filter_map(|arrival| arrival.frame().decode::<GIMBAL_DEVICE_ATTITUDE_STATUS_DATA>());
+    let mut managed = arrivals.filter_map(|arrival| arrival.frame().decode::<GIMBAL_MANAGER_STATUS_DATA>());
+    let device = statuses.next_back().expect("a 285").flags;
+    let manager = managed.next_back().expect("a 281").flags;
+    world.forget();
+    (device & 1 != 0, manager & 1 != 0)
 }
 
 /// Neutral is its home in v1, and a flag in v2.
@@ -312,14 +333,56 @@ fn a_gimbal_that_was_handed_to_its_radio_control_is_told_nothing() {
     run(&mut world, places, 3 * SECOND);
     let (commands, setpoints) = orders(&mut world, places);
     assert_eq!((commands, setpoints), (vec![packet::hand_to_rc(GIMBAL)], vec![]));
-    assert!(seen(&world).flags.iter().any(|flag| flag == "rc_exclusive"), "{:?}", seen(&world).flags);
+    assert!(is_handed_over(&world), "{:?}", seen(&world).flags);
+}
+
+fn is_handed_over(world: &World) -> bool {
+    seen(world).flags.iter().any(|flag| flag == "rc_exclusive")
+}
+
+/// The flag tells what the gimbal has done, not what was asked of it: it comes with the acknowledgement, and never after one
+/// that refuses, nor when somebody took the gimbal back meanwhile.
+#[test]
+fn its_radio_control_has_it_when_it_has_acknowledged_that() {
+    for (result, taken_back, has_it) in [
+        (CommandResult::Accepted, false, true),
+        (CommandResult::Denied, false, false),
+        (CommandResult::Accepted, true, false),
+    ] {
+        let (mut world, places) = running(Generation::V1);
+        world.remove(places.gimbal);
+        world.forget();
+        demand(&mut world, places, [0.0, 0.0, NAN, NAN, 256.0]);
+        assert_eq!(orders(&mut world, places).0, [packet::hand_to_rc(GIMBAL)]);
+        let tells = |world: &mut World| {
+            let orientation =
+                MOUNT_ORIENTATION_DATA { time_boot_ms: 90_000, roll: 0.0, pitch: 0.0, yaw: 0.0, yaw_absolute: 0.0 };
+            world.send(places.gimbal, GIMBAL, &MavMessage::MOUNT_ORIENTATION(orientation));
+        };
+        tells(&mut world);
+        assert!(!is_handed_over(&world), "it has not acknowledged it");
+        if taken_back {
+            demand(&mut world, places, [-10.0, 20.0, NAN, NAN, 0.0]);
+        }
+        let ack = COMMAND_ACK_DATA {
+            command: command::DO_MOUNT_CONFIGURE,
+            result: result as u8,
+            progress: 0,
+            result_param2: 0,
+            target_system: MANAGER.system,
+            target_component: MANAGER.component,
+        };
+        world.send(places.gimbal, GIMBAL, &MavMessage::COMMAND_ACK(ack));
+        tells(&mut world);
+        assert_eq!(is_handed_over(&world), has_it, "{result:?} {taken_back}");
+    }
 }
 
 /// Gimbal statement 20: "MOUNT_STATUS never updates the attitude estimate of a Gremsy profile; it updates the encoder
 /// values only." 19: "In LOCK the attitude yaw comes from yaw_absolute, in FOLLOW from yaw."
 #[test]
 fn statements_19_and_20_what_is_the_attitude() {
-    use gimbald::wire::dialect::{MOUNT_ORIENTATION_DATA, MOUNT_STATUS_DATA, SYS_STATUS_DATA};
+    use gimbald::wire::dialect::{MOUNT_STATUS_DATA, SYS_STATUS_DATA};
     let (mut world, places) = running(Generation::V1);
     world.remove(places.gimbal);
     let before = looks(&world);

@@ -118,6 +118,25 @@ fn what_is_asked_by_name_waits_until_it_has_stopped() {
     }
 }
 
+/// A line that is out towards the gimbal for longer than a stop is waited for, and something asked meanwhile that would take
+/// the place of the zeros: it is not done, and the gimbal stands as soon as it hears again.
+#[test]
+fn one_that_hears_nothing_for_long_stands_when_it_hears_again() {
+    for operation in [Operation::SetYawMode(YawMode::Follow), Operation::RadioControl, Operation::Mapping] {
+        let (mut world, places, deaf) = turning_by_name(Generation::V2);
+        deaf.setpoints.set(u32::MAX);
+        run(&mut world, places, 20 * SECOND);
+        let not_done = operate(&mut world, places, operation.clone());
+        assert_eq!(not_done, Some(Err(NotDone::Operation(OperationError::NoAnswer))), "{operation:?}");
+        let before = looks(&world).1;
+        run(&mut world, places, SECOND);
+        assert!((looks(&world).1 - before).rem_euclid(360.0) > 4.0, "it turns: {before} {:?}", looks(&world));
+        deaf.setpoints.set(0);
+        run(&mut world, places, 6 * SECOND);
+        assert_rests(&mut world, places);
+    }
+}
+
 /// Neutral, and the hand-over to its radio control, by a demand whose first zeros are lost.
 #[test]
 fn neutral_and_radio_control_come_after_the_stop() {
