@@ -4,15 +4,17 @@
 //! against the vehicle before they come here. One that must be configured is sent the newest setpoint when it has answered
 //! that, or will not.
 
+mod assumed;
+
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use self::assumed::{AssumedPose, capabilities};
 use super::config::{V1RadioControl, V1Settings};
 use super::obedience::{Finding, Obedience};
 use super::packet::{self, MountControl};
-use crate::geometry::{Angle, AngularRate, Attitude, AxisLimits, GimbalAngles, Limits, VehicleFrame};
+use crate::geometry::{Attitude, GimbalAngles, VehicleFrame};
 use crate::gimbals::boot_clock::BootClock;
-use crate::gimbals::capabilities::Capabilities;
 use crate::gimbals::details::GimbalDetails;
 use crate::gimbals::driver::{CommandOutcome, DriverOutput, GimbalDriver};
 use crate::gimbals::gremsy;
@@ -23,7 +25,7 @@ use crate::gimbals::settings::Family;
 use crate::timers::TimerTable;
 use crate::timestamp::Timestamp;
 use crate::wire::dialect::{COMMAND_LONG_DATA, HEARTBEAT_DATA, MOUNT_ORIENTATION_DATA, MOUNT_STATUS_DATA, MessageData};
-use crate::wire::ids::{CapFlags, CommandResult, FailureFlags, GimbalFlags, mav_state, message, mount_mode};
+use crate::wire::ids::{CommandResult, FailureFlags, GimbalFlags, mav_state, message, mount_mode};
 use crate::wire::{Frame, MavId};
 
 /// A gimbal not heard for so long is lost: five heartbeats.
@@ -37,8 +39,6 @@ const LEAST_INTERVAL: Duration = Duration::from_millis(20);
 /// Without a report for so long, the attitude is that of a gimbal which does what it is told.
 const FEEDBACK_MISSING_AFTER: Duration = Duration::from_secs(2);
 const OPEN_LOOP_INTERVAL: Duration = Duration::from_millis(100);
-/// How fast such a gimbal is taken to be.
-const OPEN_LOOP_RATE: AngularRate = AngularRate::from_degrees_per_second(30.0);
 
 /// A gimbal that sends `SYS_STATUS`, as no plain v1 gimbal is known to, is asked so often whether it is a Gremsy.
 const GREMSY_QUESTIONS: u8 = 3;
@@ -47,31 +47,6 @@ const GREMSY_QUESTIONS: u8 = 3;
 const NO_RADIO_CONTROL: &str = "v1_radio_control is \"none\", so this gimbal is taken to have no radio control of its own. \
     If it has one, say in its [[gimbal]] entry how that gets the gimbal: v1_radio_control = \"silence\" (whenever the gimbal is \
     told nothing) or \"mode\" (by DO_MOUNT_CONTROL in mode 3), and restart gimbald";
-
-/// What is assumed of a v1 gimbal, which cannot say: three axes held to the horizon, yaw against the vehicle.
-fn capabilities(settings: &V1Settings) -> Capabilities {
-    let degrees = Angle::from_degrees;
-    let mut flags = CapFlags::HAS_RETRACT
-        | CapFlags::HAS_NEUTRAL
-        | CapFlags::HAS_ROLL_AXIS
-        | CapFlags::HAS_ROLL_LOCK
-        | CapFlags::HAS_PITCH_AXIS
-        | CapFlags::HAS_PITCH_LOCK
-        | CapFlags::HAS_YAW_AXIS
-        | CapFlags::HAS_YAW_FOLLOW;
-    flags.set(CapFlags::HAS_RC_INPUTS, settings.radio_control != V1RadioControl::None);
-    Capabilities {
-        flags,
-        // What ArduPilot lets pass to one.
-        limits: Limits {
-            roll: AxisLimits::new(degrees(-180.0), degrees(180.0)),
-            pitch: AxisLimits::new(degrees(-90.0), degrees(90.0)),
-            yaw: AxisLimits::new(degrees(-180.0), degrees(180.0)),
-        },
-        turns: false,
-        operates: false,
-    }
-}
 
 /// Drives one v1 gimbal.
 #[derive(Debug)]
@@ -91,9 +66,7 @@ pub struct MavlinkV1Driver {
     gremsy_questions_left: u8,
     obedience: Obedience,
     does_not_move: DoesNotMove,
-    /// Where it is taken to look while it does not say so.
-    assumed: GimbalAngles,
-    assumed_at: Timestamp,
+    assumed: AssumedPose,
     timers: TimerTable<Timer>,
     outputs: VecDeque<DriverOutput>,
 }
@@ -162,8 +135,7 @@ impl MavlinkV1Driver {
             gremsy_questions_left: GREMSY_QUESTIONS,
             obedience: Obedience::default(),
             does_not_move: DoesNotMove::default(),
-            assumed: GimbalAngles::default(),
-            assumed_at: Timestamp::ZERO,
+            assumed: AssumedPose::default(),
             timers: TimerTable::default(),
             outputs: VecDeque::new(),
         }
@@ -228,8 +200,7 @@ impl MavlinkV1Driver {
         self.feedback = if from_status { Feedback::Status } else { Feedback::Orientation };
         self.timers.set(Timer::FeedbackMissing, now + FEEDBACK_MISSING_AFTER);
         self.timers.cancel(Timer::OpenLoop);
-        self.assumed = attitude.gimbal_angles();
-        self.assumed_at = now;
+        self.assumed = AssumedPose { angles: attitude.gimbal_angles(), at: now };
         if was_open_loop {
             self.report(Report::Known(self.identity(), capabilities(&self.settings)));
         }
@@ -309,25 +280,18 @@ impl MavlinkV1Driver {
 
     /// Moves the gimbal that says nothing to where it was told to go.
     fn carry_assumed_on(&mut self, now: Timestamp) {
-        let most = OPEN_LOOP_RATE.over(now.since(self.assumed_at));
-        self.assumed_at = now;
         let target = match self.sent {
-            Some((_, MountControl::Angles(angles))) => angles,
-            Some((_, MountControl::Retract | MountControl::Neutral)) => GimbalAngles::default(),
-            Some((_, MountControl::RadioControl)) | None => return,
+            Some((_, MountControl::Angles(angles))) => Some(angles),
+            Some((_, MountControl::Retract | MountControl::Neutral)) => Some(GimbalAngles::default()),
+            Some((_, MountControl::RadioControl)) | None => None,
         };
-        let step = |at: Angle, to: Angle| at + (to - at).clamp(-most, most);
-        self.assumed = GimbalAngles {
-            roll: step(self.assumed.roll, target.roll),
-            pitch: step(self.assumed.pitch, target.pitch),
-            yaw: step(self.assumed.yaw, target.yaw),
-        };
+        self.assumed.carry_on(now, target);
     }
 
     fn report_assumed(&mut self, now: Timestamp) {
         self.carry_assumed_on(now);
         self.timers.set(Timer::OpenLoop, now + OPEN_LOOP_INTERVAL);
-        self.report_attitude(Attitude::from_gimbal_angles(self.assumed));
+        self.report_attitude(Attitude::from_gimbal_angles(self.assumed.angles));
     }
 
     fn report(&mut self, report: Report) {
@@ -478,7 +442,7 @@ impl GimbalDriver for MavlinkV1Driver {
                 Timer::FeedbackMissing => {
                     self.feedback = Feedback::OpenLoop;
                     self.obedience.pause();
-                    self.assumed_at = now;
+                    self.assumed.at = now;
                     self.report(Report::Known(self.identity(), capabilities(&self.settings)));
                     self.report_assumed(now);
                 }

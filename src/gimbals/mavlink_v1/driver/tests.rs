@@ -1,5 +1,5 @@
 use super::*;
-use crate::geometry::Yaw;
+use crate::geometry::{Angle, Yaw};
 use crate::gimbals::mavlink_v1::sim::{DeviceSettings, Feedback as Reports};
 use crate::gimbals::setpoint::Stabilised;
 use crate::gimbals::signs::{Sign, Signs};
