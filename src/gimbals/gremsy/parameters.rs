@@ -13,31 +13,12 @@ mod tables;
 use std::fmt;
 use std::ops::RangeInclusive;
 
+pub use crate::gimbals::operation::Axis;
 pub use axis_motion::AxisMotion;
 pub use codes::{AxisFlags, EncoderType, RcType};
 pub use limits::{AngleLimits, TiltSense};
 pub use motor_control::MotorControl;
 pub use tables::{ParameterTable, Row};
-
-/// The vendor's names for pitch, roll and yaw.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Axis {
-    Tilt,
-    Roll,
-    Pan,
-}
-
-impl Axis {
-    pub const ALL: [Self; 3] = [Self::Tilt, Self::Roll, Self::Pan];
-
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Tilt => "tilt",
-            Self::Roll => "roll",
-            Self::Pan => "pan",
-        }
-    }
-}
 
 /// What a parameter is for, the same in both tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

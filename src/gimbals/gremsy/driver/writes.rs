@@ -2,8 +2,8 @@
 
 use crate::geometry::{Angle, AxisLimits};
 use crate::gimbals::gremsy::parameters::{
-    self, AngleLimits, Axis, AxisFlags, EncoderType, MotorControl, Parameter, ParameterError, ParameterTable,
-    ParameterWrite, RcType, TiltSense,
+    self, AngleLimits, AxisFlags, EncoderType, MotorControl, Parameter, ParameterError, ParameterTable, ParameterWrite,
+    RcType, TiltSense,
 };
 use crate::gimbals::operation::{self, EncoderUnit, Operation, OperationError};
 
@@ -17,14 +17,14 @@ pub fn writes(
     let flag = |flag: AxisFlags, on| flag.switched(table, on, &value).map(|write| vec![write]).map_err(refused);
     Some(match operation {
         Operation::SetAxisMotion { axis, motion } => axis_motion(motion).and_then(|motion| {
-            let writes = motion.writes(table, axis_of(*axis), &value).map_err(refused)?;
+            let writes = motion.writes(table, *axis, &value).map_err(refused)?;
             not_empty(writes)
         }),
         Operation::SetMotorControl(control) => {
             motor_control(control).and_then(|control| not_empty(control.writes(table).map_err(refused)?))
         }
         Operation::SetLimits { axis, limits } => angle_limits(*limits).and_then(|limits| {
-            let writes = limits.writes(table, TiltSense::of(table), axis_of(*axis)).map_err(refused)?;
+            let writes = limits.writes(table, TiltSense::of(table), *axis).map_err(refused)?;
             Ok(writes.to_vec())
         }),
         Operation::SetRadioType(kind) => one(table, Parameter::RcType, RcType::Named(*kind).code()),
@@ -56,14 +56,6 @@ fn refused(error: ParameterError) -> OperationError {
         | ParameterError::OutOfRange { .. }
         | ParameterError::Limit { .. }
         | ParameterError::Crossed { .. } => OperationError::Invalid(error.to_string()),
-    }
-}
-
-pub const fn axis_of(axis: operation::Axis) -> Axis {
-    match axis {
-        operation::Axis::Tilt => Axis::Tilt,
-        operation::Axis::Roll => Axis::Roll,
-        operation::Axis::Pan => Axis::Pan,
     }
 }
 
