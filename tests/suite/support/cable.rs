@@ -3,12 +3,9 @@
 use std::cell::Cell;
 use std::rc::Rc;
 
-use gimbald::wire::dialect::{
-    COMMAND_LONG_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA, GIMBAL_MANAGER_STATUS_DATA, MavMessage,
-    PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA,
-};
-use gimbald::wire::target::message_shape;
-use gimbald::wire::{DatagramFrames, Frame, FrameBuffer, MavId};
+use gimbald::wire::dialect::{GIMBAL_MANAGER_STATUS_DATA, MavMessage};
+use gimbald::wire::target::{MessageShape, message_shape};
+use gimbald::wire::{DatagramFrames, FrameBuffer, MavId, Target};
 
 use super::interception::{Interceptor, Passage};
 use super::wire::checksum;
@@ -45,7 +42,7 @@ impl Interceptor for Cable {
         }
         match self.alias.get() {
             None => Passage::Through,
-            Some(alias) => towards_gimbal(bytes, alias).map_or(Passage::Lost, Passage::As),
+            Some(alias) => towards_gimbal(bytes, alias),
         }
     }
 
@@ -58,55 +55,45 @@ impl Interceptor for Cable {
 }
 
 /// What is for `alias` is for the gimbal; what is for the gimbal's own id is for nobody.
-fn towards_gimbal(bytes: &[u8], alias: MavId) -> Option<Vec<u8>> {
+fn towards_gimbal(bytes: &[u8], alias: MavId) -> Passage {
     let frame = DatagramFrames::new(bytes).next_frame().expect("the core sends whole frames");
-    let is_its = |system: &mut u8, component: &mut u8| {
-        let target = MavId::new(*system, *component);
-        (*system, *component) = if target == alias { (GIMBAL.system, GIMBAL.component) } else { (*system, *component) };
-        target != GIMBAL
-    };
     if let Some(mut status) = frame.decode::<GIMBAL_MANAGER_STATUS_DATA>() {
-        let is_its = status.gimbal_device_id == alias.component;
+        if status.gimbal_device_id != alias.component {
+            return Passage::Lost;
+        }
         status.gimbal_device_id = GIMBAL.component;
         let message = MavMessage::GIMBAL_MANAGER_STATUS(status);
-        let encode = || FrameBuffer::default().encode_any(frame.source(), frame.sequence(), &message).bytes().to_vec();
-        return is_its.then(encode);
+        let encoded = FrameBuffer::default().encode_any(frame.source(), frame.sequence(), &message).bytes().to_vec();
+        return Passage::As(encoded);
     }
-    let changed = with_target(&frame, is_its)?;
-    Some(changed.unwrap_or_else(|| bytes.to_vec()))
+    match frame.target() {
+        Target::Component(target) if target == alias => Passage::As(with_target(bytes.to_vec(), GIMBAL)),
+        Target::Component(GIMBAL) => Passage::Lost,
+        _ => Passage::Through,
+    }
 }
 
-/// The frame with the target that `change` makes of it, `None` where it says no; untouched where it has none that
-/// matters.
-fn with_target(frame: &Frame<'_>, change: impl Fn(&mut u8, &mut u8) -> bool) -> Option<Option<Vec<u8>>> {
-    let again = |message: MavMessage| {
-        let encoded = FrameBuffer::default().encode_any(frame.source(), frame.sequence(), &message).bytes().to_vec();
-        Some(Some(encoded))
-    };
-    if let Some(mut command) = frame.decode::<COMMAND_LONG_DATA>() {
-        let is_its = change(&mut command.target_system, &mut command.target_component);
-        return if is_its { again(MavMessage::COMMAND_LONG(command)) } else { None };
-    }
-    if let Some(mut setpoint) = frame.decode::<GIMBAL_DEVICE_SET_ATTITUDE_DATA>() {
-        let is_its = change(&mut setpoint.target_system, &mut setpoint.target_component);
-        return if is_its { again(MavMessage::GIMBAL_DEVICE_SET_ATTITUDE(setpoint)) } else { None };
-    }
-    if let Some(mut request) = frame.decode::<PARAM_REQUEST_READ_DATA>() {
-        let is_its = change(&mut request.target_system, &mut request.target_component);
-        return if is_its { again(MavMessage::PARAM_REQUEST_READ(request)) } else { None };
-    }
-    if let Some(mut request) = frame.decode::<PARAM_REQUEST_LIST_DATA>() {
-        let is_its = change(&mut request.target_system, &mut request.target_component);
-        return if is_its { again(MavMessage::PARAM_REQUEST_LIST(request)) } else { None };
-    }
-    Some(None)
+/// A frame that has a target, with another one.
+fn with_target(mut bytes: Vec<u8>, target: MavId) -> Vec<u8> {
+    let shape = shape(&bytes);
+    let at = |offset: Option<u8>| 10 + usize::from(offset.expect("it has a target"));
+    bytes[at(shape.system_offset)] = target.system;
+    bytes[at(shape.component_offset)] = target.component;
+    with_checksum(bytes)
 }
 
 fn from_gimbal(mut bytes: Vec<u8>, alias: MavId) -> Vec<u8> {
-    let shape = message_shape(u32::from_le_bytes([bytes[7], bytes[8], bytes[9], 0])).expect("a known message");
     bytes[5..7].copy_from_slice(&[alias.system, alias.component]);
+    with_checksum(bytes)
+}
+
+fn with_checksum(mut bytes: Vec<u8>) -> Vec<u8> {
     let end = 10 + usize::from(bytes[1]);
-    let sum = checksum(&bytes[1..end], shape.crc_extra);
+    let sum = checksum(&bytes[1..end], shape(&bytes).crc_extra);
     bytes[end..end + 2].copy_from_slice(&sum.to_le_bytes());
     bytes
+}
+
+fn shape(bytes: &[u8]) -> &'static MessageShape {
+    message_shape(u32::from_le_bytes([bytes[7], bytes[8], bytes[9], 0])).expect("a known message")
 }
