@@ -129,16 +129,14 @@ fn operate(world: &mut World, places: Places, operation: Operation) -> Option<An
 }
 
 fn ask(world: &mut World, places: Places, asked: &Asked) -> Option<Answer> {
-    let id = OperationId(1_000 + world.answers.len() as u64);
-    world.input(Input::Asked { id, gimbal: "camera", asked });
+    let id = world.ask_by_name("camera", asked);
     run(world, places, 8 * SECOND);
     world.answers.iter().find(|(answered, _)| *answered == id).map(|(_, answer)| answer.clone())
 }
 
 /// Primary control, in the name of those who ask by the gimbal's name.
 fn take_control(world: &mut World) {
-    let id = OperationId(1_000 + world.answers.len() as u64);
-    world.input(Input::Asked { id, gimbal: "camera", asked: &Asked::TakeControl });
+    let id = world.ask_by_name("camera", &Asked::TakeControl);
     assert_eq!(world.answers.last(), Some(&(id, Ok(()))));
 }
 
@@ -147,8 +145,7 @@ fn point(world: &mut World, pitch: f64, yaw: f64) {
     let axis = |degrees| AxisDemand { angle: Some(Angle::from_degrees(degrees)), rate: None };
     let roll = AxisDemand::default();
     let asked = Asked::Point { roll, pitch: axis(pitch), yaw: axis(yaw), yaw_frame: YawFrame::Vehicle };
-    let id = OperationId(1_000 + world.answers.len() as u64);
-    world.input(Input::Asked { id, gimbal: "camera", asked: &asked });
+    let id = world.ask_by_name("camera", &asked);
     assert!(world.answers.contains(&(id, Ok(()))), "{:?}", world.answers.last());
 }
 

@@ -4,10 +4,9 @@
 use std::time::Duration;
 
 use gimbald::actions::Action;
-use gimbald::bridge::Input;
 use gimbald::bridge::settings::Settings;
 use gimbald::gimbals::gremsy::sim::{Device, DeviceSettings, Generation};
-use gimbald::gimbals::operation::{OperationError, OperationId};
+use gimbald::gimbals::operation::OperationError;
 use gimbald::gimbals::settings::{Family, GimbalSettings};
 use gimbald::manager::asked::{Answer, NotDone};
 use gimbald::manager::request::Refusal;
@@ -35,8 +34,7 @@ fn ask(world: &mut World, command: &str, in_path: Option<&str>, body: &str) -> A
     let action = Action::of_command(command).expect(command);
     let asked = action.read(in_path, body.as_bytes()).unwrap_or_else(|wrong| panic!("{command} {body}: {wrong}"));
     world.answers.clear();
-    let id = OperationId(world.now.as_micros());
-    world.input(Input::Asked { id, gimbal: "camera", asked: &asked });
+    let id = world.ask_by_name("camera", &asked);
     let end = world.now + 21 * SECOND;
     while world.answers.is_empty() && world.now < end {
         world.run_for(SECOND / 100);

@@ -7,10 +7,9 @@ mod streams;
 use std::time::Duration;
 
 use gimbald::actions::Action;
-use gimbald::bridge::Input;
 use gimbald::bridge::settings::Settings;
 use gimbald::gimbals::mavlink_v1::config::V1Settings;
-use gimbald::gimbals::operation::{OperationError, OperationId};
+use gimbald::gimbals::operation::OperationError;
 use gimbald::gimbals::settings::{Family, GimbalSettings};
 use gimbald::gimbals::signs::Signs;
 use gimbald::manager::asked::NotDone;
@@ -312,8 +311,7 @@ fn a_v1_gimbal_is_left_to_its_radio_control_by_its_name() {
         let action = Action::of_command(command).expect(command);
         let asked = action.read(None, body.as_bytes()).expect(body);
         world.answers.clear();
-        let id = OperationId(world.now.as_micros());
-        world.input(Input::Asked { id, gimbal: "camera", asked: &asked });
+        world.ask_by_name("camera", &asked);
         world.run_for(SECOND / 10);
         std::mem::take(&mut world.answers).into_iter().map(|(_, answer)| answer).collect::<Vec<_>>()
     };

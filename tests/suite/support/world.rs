@@ -10,7 +10,7 @@ use gimbald::bridge::snapshot::Snapshot;
 use gimbald::bridge::{Bridge, ChannelId, Input, Output};
 use gimbald::gimbals::mavlink_v2::sim::{Device, DeviceSettings};
 use gimbald::gimbals::operation::OperationId;
-use gimbald::manager::asked::Answer;
+use gimbald::manager::asked::{Answer, Asked};
 use gimbald::sim::peer::{Peer, PlatformMotion};
 use gimbald::sim::vehicle::{Vehicle, VehicleSettings};
 use gimbald::timestamp::Timestamp;
@@ -76,7 +76,11 @@ pub struct World {
     pub stored_turning: Vec<String>,
     /// What became of what was asked of gimbals by name.
     pub answers: Vec<(OperationId, Answer)>,
+    asked_by_name: u64,
 }
+
+/// What [`World::ask_by_name`] numbers from: beyond any number that a test gives by itself.
+const FIRST_BY_NAME: u64 = 1_000_000;
 
 impl World {
     /// A core whose links are all up, with one open channel each, and nobody there. The places are in the order of
@@ -92,6 +96,7 @@ impl World {
             stored_system_ids: Vec::new(),
             stored_turning: Vec::new(),
             answers: Vec::new(),
+            asked_by_name: 0,
         };
         let mut places = Vec::new();
         for link in 0..links {
@@ -108,6 +113,14 @@ impl World {
         let address = format!("test:{}", channel.index());
         self.input(Input::ChannelOpened { channel, link, address: &address });
         Place(self.ends.len() - 1)
+    }
+
+    /// Asks something of a gimbal by its name; what becomes of it is in `answers` under this number.
+    pub fn ask_by_name(&mut self, gimbal: &str, asked: &Asked) -> OperationId {
+        let id = OperationId(FIRST_BY_NAME + self.asked_by_name);
+        self.asked_by_name += 1;
+        self.input(Input::Asked { id, gimbal, asked });
+        id
     }
 
     /// The daemon ends without a word, as after SIGKILL.

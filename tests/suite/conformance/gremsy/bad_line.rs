@@ -2,10 +2,9 @@
 
 use std::time::Duration;
 
-use gimbald::bridge::Input;
 use gimbald::gimbals::gremsy::config::GremsySettings;
 use gimbald::gimbals::gremsy::sim::{Device, Generation};
-use gimbald::gimbals::operation::{Operation, OperationId, YawMode};
+use gimbald::gimbals::operation::{Operation, YawMode};
 use gimbald::manager::asked::Asked;
 use gimbald::sim::faults::{Faults, FaultyPeer};
 use gimbald::sim::vehicle::{Vehicle, VehicleSettings};
@@ -29,9 +28,8 @@ fn statement_96_modes_change_within_three_seconds_on_a_bad_line() {
 
             for turn in 0..4 {
                 let (mode, name) = [(YawMode::Lock, "lock"), (YawMode::Follow, "follow")][turn % 2];
-                let id = OperationId(2_000 + turn as u64);
                 let asked = Asked::Operation(Operation::SetYawMode(mode));
-                world.input(Input::Asked { id, gimbal: "camera", asked: &asked });
+                let id = world.ask_by_name("camera", &asked);
                 run(&mut world, places, 3 * SECOND);
 
                 let answer = world.answers.iter().find(|(answered, _)| *answered == id);

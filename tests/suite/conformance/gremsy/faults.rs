@@ -171,9 +171,8 @@ fn motors_that_are_being_switched_on_are_no_fault() {
         take_control(&mut world);
         assert_eq!(operate(&mut world, places, Operation::Motors(Motors::Off)), Some(Ok(())));
         world.forget();
-        let id = OperationId(77);
         let on = Asked::Operation(Operation::Motors(Motors::On));
-        world.input(Input::Asked { id, gimbal: "camera", asked: &on });
+        world.ask_by_name("camera", &on);
         run(&mut world, places, Duration::from_millis(100));
         point(&mut world, -20.0, 30.0);
         run(&mut world, places, 8 * SECOND);

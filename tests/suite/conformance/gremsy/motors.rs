@@ -12,10 +12,8 @@ const FAULT: &str = "it was told to move while its motors are off. Switch them o
 
 /// Asks for motors, and lets so much time pass.
 fn ask_for(world: &mut World, places: Places, motors: Motors, duration: Duration) -> OperationId {
-    // What is asked before it is answered has another one.
-    let id = OperationId(50_000 + world.answers.len() as u64);
     let asked = Asked::Operation(Operation::Motors(motors));
-    world.input(Input::Asked { id, gimbal: "camera", asked: &asked });
+    let id = world.ask_by_name("camera", &asked);
     run(world, places, duration);
     id
 }

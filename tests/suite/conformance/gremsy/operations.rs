@@ -105,9 +105,8 @@ fn lock_and_follow() {
 fn statement_26_a_silent_gimbal_is_told_five_times() {
     let (mut world, places) = controlled(Generation::V2);
     world.remove(places.gimbal);
-    let id = OperationId(77);
     let asked = Asked::Operation(Operation::SetYawMode(YawMode::Lock));
-    world.input(Input::Asked { id, gimbal: "camera", asked: &asked });
+    let id = world.ask_by_name("camera", &asked);
     run(&mut world, places, Duration::from_millis(499));
     assert_eq!(world.answers.last().map(|(last, _)| *last == id), Some(false));
     run(&mut world, places, Duration::from_millis(1));
@@ -363,9 +362,8 @@ fn statements_7_to_10_answers_of_the_gimbal() {
     ] {
         let (mut world, places) = controlled(Generation::V1);
         world.remove(places.gimbal);
-        let id = OperationId(77);
         let asked = Asked::Operation(Operation::RequestInformation);
-        world.input(Input::Asked { id, gimbal: "camera", asked: &asked });
+        let id = world.ask_by_name("camera", &asked);
         run(&mut world, places, after);
         for result in results {
             let (target_system, target_component) = target;
@@ -445,7 +443,6 @@ fn turn_to(world: &mut World, yaw: f64) {
     let yaw = AxisDemand { angle: Some(Angle::from_degrees(yaw)), rate: None };
     let (roll, pitch) = (AxisDemand::default(), AxisDemand::default());
     let asked = Asked::Point { roll, pitch, yaw, yaw_frame: YawFrame::Vehicle };
-    let id = OperationId(1_000 + world.answers.len() as u64);
-    world.input(Input::Asked { id, gimbal: "camera", asked: &asked });
+    let id = world.ask_by_name("camera", &asked);
     assert_eq!(world.answers.last(), Some(&(id, Ok(()))));
 }

@@ -93,10 +93,8 @@ fn events(world: &World) -> Vec<String> {
 }
 
 fn restart(world: &mut World, restart: Restart) -> OperationId {
-    let id = OperationId(5_000 + world.answers.len() as u64);
     let asked = Asked::Operation(Operation::Restart(restart));
-    world.input(Input::Asked { id, gimbal: "camera", asked: &asked });
-    id
+    world.ask_by_name("camera", &asked)
 }
 
 fn roi() -> gimbald::wire::dialect::MavMessage {
@@ -121,8 +119,7 @@ fn assert_refused(world: &mut World) {
             datum: gimbald::manager::roi::Datum::MeanSeaLevel,
         },
     ] {
-        let id = OperationId(9_000 + world.answers.len() as u64);
-        world.input(Input::Asked { id, gimbal: "camera", asked: &asked });
+        let id = world.ask_by_name("camera", &asked);
         let refused = Err(NotDone::Refused { refusal: later, holder: None });
         assert_eq!(world.answers.last(), Some(&(id, refused)), "{asked:?} at {}", world.now);
     }
@@ -246,8 +243,7 @@ fn while_it_starts_again_it_can_be_stopped_let_go_and_looked_at() {
         take_control(&mut world);
         restart(&mut world, Restart::Reboot);
         for _ in 0..16 {
-            let id = OperationId(9_000 + world.answers.len() as u64);
-            world.input(Input::Asked { id, gimbal: "camera", asked: &Asked::Stop });
+            let id = world.ask_by_name("camera", &Asked::Stop);
             assert_eq!(world.answers.last(), Some(&(id, Ok(()))), "{generation:?} at {}", world.now);
             run(&mut world, places, SECOND);
         }
@@ -261,8 +257,7 @@ fn while_it_starts_again_it_can_be_stopped_let_go_and_looked_at() {
         take_control(&mut world);
         restart(&mut world, Restart::Reboot);
         run(&mut world, places, SECOND);
-        let id = OperationId(9_000 + world.answers.len() as u64);
-        world.input(Input::Asked { id, gimbal: "camera", asked: &Asked::ReleaseControl });
+        let id = world.ask_by_name("camera", &Asked::ReleaseControl);
         assert_eq!(world.answers.last(), Some(&(id, Ok(()))));
         assert_eq!(seen(&world).primary, None);
         let stop = command_long(MANAGER, command::DO_GIMBAL_MANAGER_PITCHYAW, &[NAN, NAN, 0.0, 0.0, 0.0, 0.0, 0.0]);
@@ -387,9 +382,8 @@ fn operations_that_move_it_wait_for_no_restart() {
         let moving = [reset, Operation::SetYawMode(YawMode::Lock), Operation::Mapping, Operation::RadioControl];
         while stage(&world) != "running" {
             for operation in &moving {
-                let id = OperationId(9_000 + world.answers.len() as u64);
                 let asked = Asked::Operation(operation.clone());
-                world.input(Input::Asked { id, gimbal: "camera", asked: &asked });
+                let id = world.ask_by_name("camera", &asked);
                 let not_ready = Err(NotDone::Operation(OperationError::NotReady));
                 assert_eq!(world.answers.last(), Some(&(id, not_ready)), "{generation:?} {operation:?}");
             }

@@ -60,8 +60,7 @@ fn turning_by_name(generation: Generation) -> (World, Places, Deaf) {
     run(&mut world, places, SECOND);
     let (pitch, yaw) = (AngularRate::ZERO, AngularRate::from_degrees_per_second(5.0));
     let asked = Asked::Turn { roll: None, pitch, yaw, yaw_frame: YawFrame::Vehicle };
-    let id = OperationId(1_000 + world.answers.len() as u64);
-    world.input(Input::Asked { id, gimbal: "camera", asked: &asked });
+    let id = world.ask_by_name("camera", &asked);
     assert_eq!(world.answers.last(), Some(&(id, Ok(()))));
     let before = looks(&world).1;
     run(&mut world, places, SECOND);

@@ -45,8 +45,7 @@ fn what_does_not_reach_the_gimbal_is_no_event() {
     let reboot = Operation::Restart(Restart::Reboot);
     for operation in [reboot.clone(), reboot, Operation::Motors(Motors::On), set("GYRO_LPF", 6.0)] {
         let asked = Asked::Operation(operation);
-        let id = OperationId(1_000 + world.answers.len() as u64);
-        world.input(Input::Asked { id, gimbal: "camera", asked: &asked });
+        let id = world.ask_by_name("camera", &asked);
         run(&mut world, places, SECOND);
         assert!(world.answers.iter().any(|(answered, _)| *answered == id), "{asked:?}");
     }
@@ -90,9 +89,8 @@ fn while_it_starts_there_is_one_sentence() {
             Operation::RefreshParameters,
             Operation::SetStreamRate { stream: Stream::RawImu, rate: StreamRate::Hertz(5) },
         ] {
-            let id = OperationId(1_000 + world.answers.len() as u64);
             let asked = Asked::Operation(operation);
-            world.input(Input::Asked { id, gimbal: "camera", asked: &asked });
+            let id = world.ask_by_name("camera", &asked);
             let expected = (id, Err(NotDone::Operation(OperationError::NotReady)));
             assert_eq!(world.answers.last(), Some(&expected), "{generation:?} {asked:?}");
         }
@@ -131,9 +129,8 @@ fn encoders_are_never_shown_in_another_unit() {
         run(&mut world, places, 5 * SECOND);
         let before = seen(&world).details.encoders.expect("it is sent");
         for unit in [EncoderUnit::Angles, EncoderUnit::Counts] {
-            let id = OperationId(1_000 + world.answers.len() as u64);
             let asked = Asked::Operation(Operation::SetEncoderUnit(unit));
-            world.input(Input::Asked { id, gimbal: "camera", asked: &asked });
+            let id = world.ask_by_name("camera", &asked);
             let mut was_unknown = false;
             for _ in 0..400 {
                 run(&mut world, places, Duration::from_millis(5));
@@ -157,8 +154,7 @@ fn a_stream_that_is_off_has_no_rate() {
     let rate = |rate| Operation::SetStreamRate { stream: Stream::Encoders, rate };
     assert!(seen(&world).details.streams["encoders"].measured_hz.is_some());
     let asked = Asked::Operation(rate(StreamRate::Off));
-    let id = OperationId(1_000 + world.answers.len() as u64);
-    world.input(Input::Asked { id, gimbal: "camera", asked: &asked });
+    let id = world.ask_by_name("camera", &asked);
     while !world.answers.contains(&(id, Ok(()))) {
         run(&mut world, places, Duration::from_millis(5));
     }

@@ -32,8 +32,7 @@ const NOBODY: MavId = MavId::new(0, 0);
 /// Asks for one thing and gives its one answer, which must come at once.
 fn ask(world: &mut World, asked: &Asked) -> Answer {
     world.answers.clear();
-    let id = OperationId(world.now.as_micros());
-    world.input(Input::Asked { id, gimbal: NAME, asked });
+    let id = world.ask_by_name(NAME, asked);
     let [(answered, answer)] = &world.answers[..] else { panic!("{:?} is no single answer", world.answers) };
     assert_eq!(*answered, id);
     answer.clone()
