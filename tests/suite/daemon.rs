@@ -13,9 +13,10 @@ mod unplugged;
 
 use gimbald::gimbals::mavlink_v2::sim::{Device, DeviceSettings};
 use gimbald::timestamp::Timestamp;
-use gimbald::wire::dialect::{ATTITUDE_DATA, COMMAND_LONG_DATA, GIMBAL_MANAGER_SET_PITCHYAW_DATA, MavMessage};
+use gimbald::wire::dialect::{ATTITUDE_DATA, GIMBAL_MANAGER_SET_PITCHYAW_DATA, MavMessage};
 
 use crate::support::daemon::{Shared, link};
+use crate::support::script::command_long;
 use crate::support::world::MANAGER;
 
 /// A gimbal on a serial line, an autopilot and a ground station on UDP; our system id is 1.
@@ -53,19 +54,7 @@ fn set_pitchyaw(pitch: f32, yaw: f32, pitch_rate: f32, yaw_rate: f32) -> MavMess
 }
 
 fn command(number: u16, param1: f32, target: gimbald::wire::MavId) -> MavMessage {
-    MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
-        param1,
-        param2: 0.0,
-        param3: 0.0,
-        param4: 0.0,
-        param5: 0.0,
-        param6: 0.0,
-        param7: 0.0,
-        command: number,
-        target_system: target.system,
-        target_component: target.component,
-        confirmation: 0,
-    })
+    command_long(target, number, &[param1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 }
 
 /// Telemetry with a number in it.

@@ -171,30 +171,16 @@ fn parameter_request(sequence: u8) -> Vec<u8> {
 fn command(sequence: u8, number: u16) -> Vec<u8> {
     let message = COMMAND_LONG_DATA {
         param1: 283.0,
-        param2: 0.0,
-        param3: 0.0,
-        param4: 0.0,
-        param5: 0.0,
-        param6: 0.0,
-        param7: 0.0,
         command: number,
         target_system: 1,
         target_component: 154,
-        confirmation: 0,
+        ..COMMAND_LONG_DATA::DEFAULT
     };
     encode_to_vec(MavId::new(1, 191), sequence, &message)
 }
 
 fn attitude(sequence: u8) -> Vec<u8> {
-    let message = ATTITUDE_DATA {
-        time_boot_ms: 1,
-        roll: 0.0,
-        pitch: 0.0,
-        yaw: 0.0,
-        rollspeed: 0.0,
-        pitchspeed: 0.0,
-        yawspeed: 1.0,
-    };
+    let message = ATTITUDE_DATA { time_boot_ms: 1, yawspeed: 1.0, ..ATTITUDE_DATA::DEFAULT };
     encode_to_vec(MavId::new(1, 1), sequence, &message)
 }
 
