@@ -5,13 +5,17 @@
 //! with zeros, which wait for nothing. Whatever else is wanted of a gimbal that may be turning waits for the answer to one
 //! of these, except an angle that can be said at once.
 
+mod order;
+
 use std::collections::VecDeque;
 use std::time::Duration;
 
+pub use self::order::Order;
+
 use super::rotation::Rotation;
-use crate::geometry::{AngularRate, GimbalAngles};
+use crate::geometry::AngularRate;
 use crate::gimbals::gremsy::packet;
-use crate::gimbals::operation::{ResetMode, YawMode};
+use crate::gimbals::operation::YawMode;
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 use crate::wire::dialect::COMMAND_LONG_DATA;
@@ -45,35 +49,6 @@ const MOTORS_START: Duration = Duration::from_secs(6);
 /// So many orders without one answer, and for so long, mean that it does not hear.
 const UNANSWERED: u32 = 5;
 const UNANSWERED_FOR: Duration = Duration::from_secs(3);
-
-/// What the gimbal is to do.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Order {
-    Point {
-        angles: GimbalAngles,
-        mode: YawMode,
-    },
-    Turn {
-        /// About roll, pitch and yaw.
-        rates: [AngularRate; 3],
-        mode: YawMode,
-    },
-    Home,
-    /// Switches the motors off.
-    Retract,
-    /// To its own radio receiver.
-    RadioControl,
-}
-
-impl Order {
-    pub fn is_stop(self) -> bool {
-        matches!(self, Self::Turn { rates, .. } if rates.iter().all(|rate| rate.is_zero()))
-    }
-
-    fn turns(self) -> bool {
-        matches!(self, Self::Turn { .. }) && !self.is_stop()
-    }
-}
 
 /// How the gimbal is at this moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -276,7 +251,7 @@ impl Mount {
             }
             return true;
         }
-        self.is_given && self.given(device).is_some_and(|given| is(&given))
+        self.is_given && self.wanted.and_then(|wanted| wanted.given_once(device)).is_some_and(|given| is(&given))
     }
 
     /// Sends what is due, or says in [`poll_timeout`](Self::poll_timeout) when it is.
@@ -415,7 +390,7 @@ impl Mount {
         if self.is_given {
             return;
         }
-        let Some(command) = self.given(device) else { return };
+        let Some(command) = self.wanted.and_then(|wanted| wanted.given_once(device)) else { return };
         self.is_given = true;
         self.sent = None;
         match self.wanted {
@@ -424,16 +399,6 @@ impl Mount {
             _ => {}
         }
         self.outputs.push_back(MountOutput::Command(command));
-    }
-
-    /// The command of an order that is given out once.
-    fn given(&self, device: MavId) -> Option<COMMAND_LONG_DATA> {
-        match self.wanted? {
-            Order::Home => Some(packet::reset(device, ResetMode::PitchAndYaw)),
-            Order::Retract => Some(packet::set_motors(device, false)),
-            Order::RadioControl => Some(packet::hand_to_rc(device)),
-            Order::Point { .. } | Order::Turn { .. } => None,
-        }
     }
 
     fn send_when_due(&mut self, now: Timestamp, device: MavId, condition: Condition) {
@@ -446,13 +411,7 @@ impl Mount {
     }
 
     fn say(&mut self, now: Timestamp, device: MavId, order: Order) {
-        let command = match order {
-            Order::Point { angles, .. } => {
-                packet::rotate_to(device, GimbalAngles { yaw: angles.yaw.wrapped(), ..angles })
-            }
-            Order::Turn { rates, .. } => packet::turn_at(device, rates),
-            Order::Home | Order::Retract | Order::RadioControl => return,
-        };
+        let Some(command) = order.repeated(device) else { return };
         self.sent = Some((now, order));
         self.rotation.handle_sent(now, order.turns());
         if order.turns() {

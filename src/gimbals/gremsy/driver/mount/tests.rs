@@ -1,5 +1,6 @@
 use super::*;
-use crate::geometry::Angle;
+use crate::geometry::{Angle, GimbalAngles};
+use crate::gimbals::operation::ResetMode;
 
 const GIMBAL: MavId = MavId::new(1, 154);
 const READY: Condition = Condition { is_heard: true, is_ready: true, is_there: false, motors_on: true };
