@@ -91,7 +91,7 @@ fn scan_leaves_the_port_of_a_running_daemon_alone() {
     // The far end is open in this test too, and whoever is found first is named.
     let start = format!("{}: in use by ", site.path("gimbal").display());
     assert!(outcome.errors.starts_with(&start), "{}", outcome.errors);
-    let remedy = "; if it is the service, name its page with --url, and it is asked what is there";
+    let remedy = "; if it is the service, name its page with --url or its configuration with --config, and it is asked what is there";
     let remedy = if outcome.errors.contains("in use by gimbald ") { remedy } else { "" };
     let end = format!("){remedy}\ngimbald scan: nothing answered\n");
     assert!(outcome.errors.ends_with(&end), "{}", outcome.errors);
