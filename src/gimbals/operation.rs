@@ -408,6 +408,9 @@ pub enum OperationError {
     Failed,
     #[error("the gimbal did not answer")]
     NoAnswer,
+    /// It was asked for parameters and has told none at all.
+    #[error("the gimbal tells no parameters: it has none, or does not hear that it is asked for them")]
+    NoParameters,
     /// Answered, and yet it is not so.
     #[error("the gimbal answered, but did not do it: {0}")]
     NoEffect(String),

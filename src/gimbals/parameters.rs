@@ -1,62 +1,33 @@
 //! A gimbal's parameters, for any driver: read, kept up to date, and set, each with retry.
 //!
 //! The list is asked for; when nothing has come for a second, what is missing is read one by one, up to five times each,
-//! and what then has not come does not exist. A value is set until the gimbal tells it back. What the gimbal tells
-//! others counts as well: a ground station that reads or sets parameters at the same time is not disturbed, and what it
-//! changes is known here.
+//! and what then has not come does not exist. What there should be says the gimbal's maker, by names, or the gimbal itself, by
+//! its count (`list`). A value is set until the gimbal tells it back. What the gimbal tells others counts as well: a ground
+//! station that reads or sets parameters at the same time is not disturbed, and what it changes is known here.
 
 mod change;
 mod encoding;
+mod evidence;
+mod list;
+mod reading;
 
 use std::collections::{BTreeMap, VecDeque};
-use std::time::Duration;
 
+use super::driver::DriverOutput;
 use super::operation::{OperationError, OperationId};
 use crate::timers::TimerTable;
 use crate::timestamp::Timestamp;
-use crate::wire::dialect::{
-    CharArray, MavMessage, PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA,
-};
+use crate::wire::dialect::{CharArray, MavMessage, PARAM_SET_DATA, PARAM_VALUE_DATA};
 use crate::wire::{Frame, MavId};
 use change::{Changes, Step};
 pub use encoding::Encoding;
-
-/// A list is over when nothing has come for so long.
-const QUIET: Duration = Duration::from_secs(1);
-/// It is asked for so often when nothing comes at all.
-const LIST_TRIES: u8 = 3;
-/// Somebody else who reads all the time does not keep us from going on for longer than this.
-const LONGEST_WAIT: Duration = Duration::from_secs(20);
-/// Nor is the silence after the last one waited for longer than this.
-const LONGEST_SETTLING: Duration = Duration::from_secs(2);
-
-/// Two parameters are read at least so far apart …
-const READ_SPACING: Duration = Duration::from_millis(10);
-/// … what others asked for delays one by no more than this …
-const READ_DELAY: Duration = Duration::from_millis(100);
-/// … the next round begins so long after the one before …
-const ROUND_PAUSE: Duration = Duration::from_millis(500);
-/// … and one that was read so often in vain does not exist.
-const READ_TRIES: u8 = 5;
-/// Where nothing was answered by its name so often, it is read by its index.
-const TRIES_BY_NAME: u8 = 2;
-
-/// More names than any gimbal has are not kept.
-const MAX_NAMES: usize = 512;
+use evidence::Evidence;
+pub use list::{Catalogue, Known};
+use list::{List, MAX_NAMES};
+use reading::Phase;
 
 /// So many wait for a refresh at most.
 const MAX_WAITING: usize = 8;
-
-/// A parameter that a device should have.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Known {
-    pub name: &'static str,
-    /// Its place in the vendor's tables, where that is known.
-    pub index: Option<u16>,
-}
-
-/// Which parameters a device should have, given those that it was heard to have.
-pub type Catalogue = fn(&dyn Fn(&str) -> bool) -> Vec<Known>;
 
 /// What is to be done, or has happened.
 #[derive(Clone, Debug, PartialEq)]
@@ -74,51 +45,47 @@ pub enum ParameterOutput {
 /// One gimbal's parameters.
 #[derive(Debug)]
 pub struct Parameters {
-    encoding: Encoding,
-    catalogue: Catalogue,
+    codec: Codec,
+    list: List,
     device: Option<MavId>,
     values: BTreeMap<String, Value>,
     phase: Phase,
+    /// When it is read no longer, where nobody knows how many there are.
+    ends: Option<Timestamp>,
+    /// One was told since the list was asked for.
+    is_answered: bool,
     /// When the last value came.
     heard: Timestamp,
-    /// How often each was read in vain.
-    tries: BTreeMap<&'static str, u8>,
-    /// Something that was read by its name was answered.
-    answers_to_names: bool,
     changes: Changes,
     waiting: Vec<OperationId>,
     timers: TimerTable<Timer>,
     outputs: VecDeque<ParameterOutput>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Value {
-    value: f64,
-    /// `MAV_PARAM_TYPE`.
-    kind: u8,
+/// How values travel.
+#[derive(Clone, Copy, Debug)]
+enum Codec {
+    /// As its maker says.
+    Given(Encoding),
+    /// As is found out.
+    Found(Evidence),
 }
 
-#[derive(Clone, Debug, PartialEq, Eq)]
-enum Phase {
-    /// Nothing was asked for.
-    Idle,
-    /// The list was asked for, so often since then.
-    Listing {
-        since: Timestamp,
-        tries: u8,
-        any: bool,
-    },
-    /// What is missing is read, one by one.
-    Reading {
-        queue: VecDeque<Known>,
-        /// When the next one is read at the latest.
-        latest: Timestamp,
-    },
-    /// All was read; a while of silence, and it is settled.
-    Settling {
-        since: Timestamp,
-    },
-    Settled,
+impl Codec {
+    const fn encoding(self) -> Encoding {
+        match self {
+            Self::Given(encoding) => encoding,
+            Self::Found(evidence) => evidence.encoding(),
+        }
+    }
+}
+
+/// As it was told: how it is to be read may be known only later.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Value {
+    raw: f32,
+    /// `MAV_PARAM_TYPE`.
+    kind: u8,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -132,16 +99,26 @@ enum Timer {
 }
 
 impl Parameters {
+    /// Of a gimbal whose maker tells their names and how they travel.
     pub fn new(encoding: Encoding, catalogue: Catalogue) -> Self {
+        Self::with(Codec::Given(encoding), List::named(catalogue))
+    }
+
+    /// Of a gimbal of which nothing is known: it tells how many it has, and shows how they travel.
+    pub fn of_any_gimbal() -> Self {
+        Self::with(Codec::Found(Evidence::default()), List::counted())
+    }
+
+    fn with(codec: Codec, list: List) -> Self {
         Self {
-            encoding,
-            catalogue,
+            codec,
+            list,
             device: None,
             values: BTreeMap::new(),
             phase: Phase::Idle,
+            ends: None,
+            is_answered: false,
             heard: Timestamp::ZERO,
-            tries: BTreeMap::new(),
-            answers_to_names: false,
             changes: Changes::default(),
             waiting: Vec::new(),
             timers: TimerTable::default(),
@@ -149,21 +126,15 @@ impl Parameters {
         }
     }
 
-    /// Reads everything, of `device` from now on.
-    pub fn refresh(&mut self, now: Timestamp, device: MavId) {
+    /// Learns what `device` tells anybody from now on; nothing is asked.
+    pub fn listen(&mut self, device: MavId) {
         if self.device != Some(device) {
             self.forget();
             self.device = Some(device);
         }
-        self.tries.clear();
-        self.answers_to_names = false;
-        self.phase = Phase::Listing { since: now, tries: 1, any: false };
-        self.timers.cancel(Timer::Read);
-        self.timers.set(Timer::Quiet, now + QUIET);
-        self.send_list();
     }
 
-    /// The same for somebody who is told when it is done.
+    /// Reads everything for somebody who is told when it is done.
     pub fn refresh_for(&mut self, now: Timestamp, id: OperationId) {
         let Some(device) = self.device else {
             self.done(id, Err(OperationError::NotThere));
@@ -180,14 +151,16 @@ impl Parameters {
     }
 
     /// Sets these, one after the other; the first that fails ends it.
+    ///
+    /// One of which the type is not known is read first, by the list, and by its name if it is not in there: it is not
+    /// guessed.
     pub fn set(&mut self, now: Timestamp, id: OperationId, values: &[(&str, f64)]) {
         let checked = values.iter().try_for_each(|(name, value)| {
-            encoding::check_name(name).map_err(OperationError::Invalid)?;
-            let kind = self.kind_of(name);
-            self.encoding.encode(*value, kind).map(drop).map_err(OperationError::Invalid)
+            encoding::check_name(name)?;
+            self.check(name, *value)
         });
         let result = match (checked, self.device) {
-            (Err(error), _) => Err(error),
+            (Err(problem), _) => Err(OperationError::Invalid(problem)),
             (Ok(()), None) => Err(OperationError::NotThere),
             (Ok(()), Some(_)) if values.is_empty() => Ok(()),
             (Ok(()), Some(_)) if !self.changes.has_room_for(values.len()) => Err(OperationError::Busy),
@@ -206,39 +179,52 @@ impl Parameters {
             return;
         }
         let Some(message) = frame.decode::<PARAM_VALUE_DATA>() else { return };
-        let Some(name) = encoding::read_name(&message.param_id) else { return };
-        let Some(value) = self.encoding.decode(message.param_value, message.param_type) else { return };
-        let is_new = !self.values.contains_key(name);
-        if is_new && self.values.len() >= MAX_NAMES {
+        let name = encoding::read_name(&message.param_id);
+        let told = Value { raw: message.param_value, kind: message.param_type };
+        // A maker's value that is none was not told.
+        if let Codec::Given(encoding) = self.codec
+            && (name.is_none() || encoding.decode(told.raw, told.kind).is_none())
+        {
+            return;
+        }
+        let is_new = name.is_some_and(|name| !self.values.contains_key(name));
+        let is_kept = name.is_some() && !(is_new && self.values.len() >= MAX_NAMES);
+        if !is_kept && self.list.count().is_none() {
             return;
         }
         self.heard = now;
-        if self.tries.get(name).is_some_and(|tries| *tries <= TRIES_BY_NAME) {
-            self.answers_to_names = true;
+        self.is_answered = true;
+        self.list.handle_told(name, message.param_index, message.param_count);
+        if let Some(name) = name.filter(|_| is_kept) {
+            if let Codec::Found(evidence) = &mut self.codec {
+                evidence.weigh(told.raw, told.kind);
+            }
+            self.values.insert(name.to_owned(), told);
         }
-        let entry = Value { value, kind: message.param_type };
-        self.values.insert(name.to_owned(), entry);
-        match &mut self.phase {
-            Phase::Listing { since, any, .. } => {
-                *any = true;
-                self.timers.set(Timer::Quiet, (now + QUIET).min(*since + LONGEST_WAIT));
-            }
-            // What somebody else asked for goes first.
-            Phase::Reading { latest, .. } => {
-                let at = self.timers.at(Timer::Read).unwrap_or(now);
-                self.timers.set(Timer::Read, at.max((now + READ_SPACING).min(*latest)));
-            }
-            Phase::Settling { since } => self.timers.set(Timer::Quiet, (now + QUIET).min(*since + LONGEST_SETTLING)),
-            Phase::Idle | Phase::Settled => {}
+        self.go_on_after(now);
+        if let Some(name) = name.filter(|_| is_kept) {
+            self.handle_told_current(now, name, is_new);
         }
-        let wanted = self.changes.current().filter(|(current, _)| *current == name).map(|(_, value)| value);
-        if let Some(wanted) = wanted {
-            // A value travels in single precision.
-            let is_so = value == wanted || value == f64::from(wanted as f32);
-            match self.changes.handle_echo(is_so, value) {
-                Step::Wait => {}
-                Step::Next(done) => self.end_change(now, done),
-            }
+    }
+
+    /// The gimbal told the value of `name`, which may be the one that is being set.
+    fn handle_told_current(&mut self, now: Timestamp, name: &str, is_new: bool) {
+        let Some((_, wanted)) = self.changes.current().filter(|(current, _)| *current == name) else { return };
+        let value = self.value(name);
+        // A value travels in single precision.
+        let is_so = value.is_some_and(|value| value == wanted || value == f64::from(wanted as f32));
+        let step = if is_so || !(is_new && self.reads_before_setting()) {
+            self.changes.handle_echo(is_so, value.unwrap_or(f64::NAN))
+        } else if let Err(problem) = self.check(name, wanted) {
+            self.changes.fail(OperationError::Invalid(problem))
+        } else {
+            // Its type is known from now on.
+            self.changes.start_over();
+            return self.send_change(now);
+        };
+        match step {
+            Step::Wait => {}
+            Step::Next(done) => self.end_change(now, done),
         }
     }
 
@@ -259,6 +245,15 @@ impl Parameters {
         self.outputs.pop_front()
     }
 
+    /// Hands on everything that is to be done.
+    pub fn drain_into(&mut self, outputs: &mut VecDeque<DriverOutput>) {
+        outputs.extend(self.outputs.drain(..).filter_map(|output| match output {
+            ParameterOutput::Send(message) => Some(DriverOutput::Message(message)),
+            ParameterOutput::Done { id, result } => Some(DriverOutput::Operated { id, result }),
+            ParameterOutput::Settled => None,
+        }));
+    }
+
     pub fn poll_timeout(&self) -> Option<Timestamp> {
         self.timers.next().map(|(at, _)| at)
     }
@@ -270,7 +265,10 @@ impl Parameters {
         }
         self.device = None;
         self.values.clear();
-        self.tries.clear();
+        self.list.begin();
+        if let Codec::Found(evidence) = &mut self.codec {
+            *evidence = Evidence::default();
+        }
         self.phase = Phase::Idle;
         self.timers = TimerTable::default();
     }
@@ -281,20 +279,40 @@ impl Parameters {
     }
 
     pub fn value(&self, name: &str) -> Option<f64> {
-        self.values.get(name).map(|entry| entry.value)
+        self.values.get(name).and_then(|told| self.decode(*told))
     }
 
     pub fn values(&self) -> impl Iterator<Item = (&str, f64)> {
-        self.values.iter().map(|(name, entry)| (name.as_str(), entry.value))
+        self.values.iter().filter_map(|(name, told)| Some((name.as_str(), self.decode(*told)?)))
+    }
+
+    /// All of them by name.
+    pub fn by_name(&self) -> BTreeMap<String, f64> {
+        self.values().map(|(name, value)| (name.to_owned(), value)).collect()
     }
 
     /// Whether it was read as often as a parameter is read, and did not come.
     pub fn is_missing(&self, name: &str) -> bool {
-        !self.values.contains_key(name) && self.tries.get(name).is_some_and(|tries| *tries >= READ_TRIES)
+        !self.values.contains_key(name) && self.list.was_read_in_vain(name)
     }
 
-    fn kind_of(&self, name: &str) -> Option<u8> {
-        self.values.get(name).map(|entry| entry.kind)
+    fn decode(&self, Value { raw, kind }: Value) -> Option<f64> {
+        self.codec.encoding().decode(raw, kind)
+    }
+
+    /// What is wrong with a value, as far as the type is known.
+    fn check(&self, name: &str, value: f64) -> Result<(), String> {
+        let kind = self.values.get(name).map(|told| told.kind);
+        self.codec.encoding().encode(value, kind).map(drop)
+    }
+
+    /// Why a gimbal that told nothing did not.
+    fn silence(&self) -> OperationError {
+        if self.values.is_empty() { OperationError::NoParameters } else { OperationError::NoAnswer }
+    }
+
+    const fn reads_before_setting(&self) -> bool {
+        matches!(self.codec, Codec::Found(_))
     }
 
     fn done(&mut self, id: OperationId, result: Result<(), OperationError>) {
@@ -305,95 +323,43 @@ impl Parameters {
         self.outputs.push_back(ParameterOutput::Send(Box::new(message)));
     }
 
-    fn send_list(&mut self) {
-        let Some(MavId { system, component }) = self.device else { return };
-        let list = PARAM_REQUEST_LIST_DATA { target_system: system, target_component: component };
-        self.send(MavMessage::PARAM_REQUEST_LIST(list));
-    }
-
-    fn handle_quiet(&mut self, now: Timestamp) {
-        match &mut self.phase {
-            Phase::Listing { tries, any: false, .. } if *tries < LIST_TRIES => {
-                *tries += 1;
-                self.timers.set(Timer::Quiet, now + QUIET);
-                self.send_list();
-            }
-            Phase::Listing { .. } => self.begin_round(now),
-            Phase::Settling { .. } => {
-                self.phase = Phase::Settled;
-                self.outputs.push_back(ParameterOutput::Settled);
-                for id in std::mem::take(&mut self.waiting) {
-                    self.done(id, Ok(()));
-                }
-            }
-            Phase::Idle | Phase::Reading { .. } | Phase::Settled => {}
-        }
-    }
-
-    /// Begins to read what is missing, or has nothing left to read.
-    fn begin_round(&mut self, now: Timestamp) {
-        let known = (self.catalogue)(&|name| self.values.contains_key(name));
-        let is_open = |known: &Known| {
-            !self.values.contains_key(known.name) && self.tries.get(known.name).is_none_or(|tries| *tries < READ_TRIES)
-        };
-        let queue: VecDeque<Known> = known.into_iter().filter(is_open).take(MAX_NAMES).collect();
-        if queue.is_empty() {
-            self.phase = Phase::Settling { since: now };
-            self.timers.set(Timer::Quiet, now.max(self.heard + QUIET));
-        } else {
-            self.phase = Phase::Reading { queue, latest: now };
-            self.read_next(now);
-        }
-    }
-
-    fn read_next(&mut self, now: Timestamp) {
-        let Phase::Reading { queue, latest } = &mut self.phase else { return };
-        if queue.is_empty() {
-            self.begin_round(now);
-            return;
-        }
-        while let Some(known) = queue.pop_front() {
-            if self.values.contains_key(known.name) {
-                continue;
-            }
-            let tries = self.tries.entry(known.name).or_default();
-            let by_index = *tries >= TRIES_BY_NAME && !self.answers_to_names;
-            *tries += 1;
-            let pause = if queue.is_empty() { ROUND_PAUSE } else { READ_SPACING };
-            *latest = now + pause + READ_DELAY;
-            self.timers.set(Timer::Read, now + pause);
-            self.send_read(known, by_index);
-            return;
-        }
-        *latest = now + ROUND_PAUSE + READ_DELAY;
-        self.timers.set(Timer::Read, now + ROUND_PAUSE);
-    }
-
-    /// An index beside a name is what some gimbals go by, so it is −1 as long as the name is meant.
-    fn send_read(&mut self, known: Known, by_index: bool) {
-        let Some(MavId { system, component }) = self.device else { return };
-        let index = known.index.filter(|_| by_index).and_then(|index| i16::try_from(index).ok()).unwrap_or(-1);
-        self.send(MavMessage::PARAM_REQUEST_READ(PARAM_REQUEST_READ_DATA {
-            param_index: index,
-            target_system: system,
-            target_component: component,
-            param_id: CharArray::from(known.name),
-        }));
-    }
-
     fn begin_change(&mut self, now: Timestamp) {
-        if self.changes.begin() {
-            self.send_change(now);
+        while !self.waits_for_reading(now) && self.changes.begin() {
+            let Some((name, value)) = self.changes.current() else { return };
+            let Err(problem) = self.check(name, value) else { return self.send_change(now) };
+            if let Step::Next(Some((id, result))) = self.changes.fail(OperationError::Invalid(problem)) {
+                self.done(id, result);
+            }
         }
     }
 
+    /// Whether the next one to be set cannot be sent before all were read, which is seen to.
+    fn waits_for_reading(&mut self, now: Timestamp) -> bool {
+        let Codec::Found(evidence) = self.codec else { return false };
+        let Some(name) = self.changes.next_name() else { return false };
+        let is_clear =
+            self.values.get(name).is_some_and(|told| evidence.is_decided() || !encoding::is_whole(told.kind));
+        if is_clear || self.is_settled() {
+            return false;
+        }
+        if let (Phase::Idle, Some(device)) = (&self.phase, self.device) {
+            self.refresh(now, device);
+        }
+        true
+    }
+
+    /// Sets the one that is under way, or asks for it by its name where that must be first.
     fn send_change(&mut self, now: Timestamp) {
         let Some(MavId { system, component }) = self.device else { return };
         let Some((name, value)) = self.changes.current() else { return };
-        let known = self.values.get(name).map(|entry| entry.kind);
-        let (param_value, param_type) = self.encoding.encode_typed(value, known);
-        let param_id = CharArray::from(name);
+        let known = self.values.get(name).map(|told| told.kind);
         self.timers.set(Timer::Change, now + change::PATIENCE);
+        if known.is_none() && self.reads_before_setting() {
+            let name = name.to_owned();
+            return self.send_read(&name, -1);
+        }
+        let (param_value, param_type) = self.codec.encoding().encode_typed(value, known);
+        let param_id = CharArray::from(name);
         self.send(MavMessage::PARAM_SET(PARAM_SET_DATA {
             param_value,
             target_system: system,
@@ -407,7 +373,8 @@ impl Parameters {
     fn end_change(&mut self, now: Timestamp, done: Option<(OperationId, Result<(), OperationError>)>) {
         self.timers.cancel(Timer::Change);
         if let Some((id, result)) = done {
-            self.done(id, result);
+            let is_unanswered = result == Err(OperationError::NoAnswer) && self.reads_before_setting();
+            self.done(id, if is_unanswered { Err(self.silence()) } else { result });
         }
         self.begin_change(now);
     }

@@ -236,6 +236,7 @@ fn refused(not_done: NotDone) -> Refusal {
                 OperationError::Failed => (StatusCode::BAD_GATEWAY, "failed"),
                 OperationError::NoEffect(_) => (StatusCode::BAD_GATEWAY, "no_effect"),
                 OperationError::NoAnswer => (StatusCode::GATEWAY_TIMEOUT, "no_answer"),
+                OperationError::NoParameters => (StatusCode::GATEWAY_TIMEOUT, "no_parameters"),
             };
             Refusal { reason: Some(reason), ..Refusal::new(status, error.to_string()) }
         }

@@ -139,6 +139,7 @@ fn result_of(answer: &Result<(), NotDone>) -> CommandResult {
             OperationError::NotThere
             | OperationError::Failed
             | OperationError::NoAnswer
+            | OperationError::NoParameters
             | OperationError::NoEffect(_) => CommandResult::Failed,
         },
     }

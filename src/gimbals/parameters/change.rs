@@ -71,6 +71,11 @@ impl Changes {
         self.sent.is_some()
     }
 
+    /// The name of the one to be taken up next; `None` while one is under way.
+    pub fn next_name(&self) -> Option<&str> {
+        self.waiting.front().filter(|_| self.sent.is_none()).map(|change| change.name.as_str())
+    }
+
     /// Name and value of the one under way.
     pub fn current(&self) -> Option<(&str, f64)> {
         self.sent.as_ref().map(|sent| (sent.change.name.as_str(), sent.change.value))
@@ -84,6 +89,18 @@ impl Changes {
         }
         sent.other = Some(value);
         Step::Wait
+    }
+
+    /// What was done so far for the one under way was not yet to set it.
+    pub fn start_over(&mut self) {
+        if let Some(sent) = &mut self.sent {
+            *sent = Sent { change: sent.change.clone(), tries: 1, other: None, others: 0 };
+        }
+    }
+
+    /// The one under way cannot be set.
+    pub fn fail(&mut self, error: OperationError) -> Step {
+        self.finish(Err(error))
     }
 
     /// It has told nothing that ends the one under way for so long.

@@ -58,6 +58,9 @@ impl Encoding {
         {
             return Err(format!("{value} is no whole number from {least} to {most}"));
         }
+        if self == Self::Bytewise && kind != kind::REAL32 && range(kind).is_none() {
+            return Err(format!("the gimbal gives this parameter a type that PARAM_SET cannot carry ({kind})"));
+        }
         if self != Self::Bytewise || kind == kind::REAL32 {
             // Adding zero keeps −0 off the wire.
             return Ok((value as f32 + 0.0).to_bits());
@@ -85,7 +88,8 @@ impl Encoding {
     }
 }
 
-fn range(kind: u8) -> Option<(f64, f64)> {
+/// The integers that a type holds, at its ends; `None` where it is none.
+pub fn range(kind: u8) -> Option<(f64, f64)> {
     match kind {
         kind::UINT8 => Some((0.0, f64::from(u8::MAX))),
         kind::INT8 => Some((f64::from(i8::MIN), f64::from(i8::MAX))),
@@ -95,6 +99,11 @@ fn range(kind: u8) -> Option<(f64, f64)> {
         kind::INT32 => Some((f64::from(i32::MIN), f64::from(i32::MAX))),
         _ => None,
     }
+}
+
+/// Whether a type holds whole numbers alone.
+pub fn is_whole(kind: u8) -> bool {
+    range(kind).is_some()
 }
 
 /// The name up to its first NUL; `None` where it is empty or no name.
@@ -149,6 +158,7 @@ mod tests {
             (Encoding::Bytewise,      kind::UINT8,  -1.0,      "-1 is no whole number from 0 to 255"),
             (Encoding::Bytewise,      kind::REAL32, f64::NAN,  "a parameter is a finite number"),
             (Encoding::CCast,         kind::REAL32, 1e300,     "a parameter is a finite number"),
+            (Encoding::Bytewise,      10,           1.0,       "the gimbal gives this parameter a type that PARAM_SET cannot carry (10)"),
         ] {
             assert_eq!(encoding.encode(value, kind), Err(problem.to_owned()));
         }

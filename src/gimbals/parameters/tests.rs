@@ -1,6 +1,12 @@
+mod any_gimbal;
+
+use std::time::Duration;
+
 use super::*;
 use crate::sim::outbox::Outbox;
 use crate::sim::parameters::{IntegerEncoding, ParameterServer, ParameterValue};
+use crate::sim::random::Random;
+use crate::wire::dialect::PARAM_REQUEST_READ_DATA;
 use crate::wire::{DatagramFrames, FrameBuffer, encode_to_vec};
 
 const MANAGER: MavId = MavId::new(1, 191);
@@ -22,6 +28,8 @@ struct Line {
     outbox: Outbox,
     /// Which requests are lost, by number.
     lost: fn(usize, &MavMessage) -> bool,
+    /// This share of what is sent is lost besides, either way.
+    loss: Option<(f64, Random)>,
     sent: Vec<(u64, MavMessage)>,
     done: Vec<(u64, ParameterOutput)>,
 }
@@ -33,12 +41,18 @@ impl Line {
             let at = NAMES.iter().position(|known| known == name).expect("one of them");
             (*name, ParameterValue::Integer(10 + at as i32))
         });
+        let gimbal = ParameterServer::new(list.collect(), IntegerEncoding::CCast);
+        Self::with(Parameters::new(Encoding::Int16AsNumber, catalogue), gimbal)
+    }
+
+    fn with(parameters: Parameters, gimbal: ParameterServer) -> Self {
         Self {
             now: Timestamp::ZERO,
-            parameters: Parameters::new(Encoding::Int16AsNumber, catalogue),
-            gimbal: ParameterServer::new(list.collect(), IntegerEncoding::CCast),
+            parameters,
+            gimbal,
             outbox: Outbox::new(GIMBAL),
             lost: |_, _| false,
+            loss: None,
             sent: Vec::new(),
             done: Vec::new(),
         }
@@ -64,7 +78,7 @@ impl Line {
                         let number = self.sent.len();
                         self.sent.push((self.now.as_micros() / 1_000, (*message).clone()));
                         let bytes = FrameBuffer::default().encode_any(MANAGER, 0, &message).bytes().to_vec();
-                        if !(self.lost)(number, &message) {
+                        if !(self.lost)(number, &message) && !self.is_lost() {
                             self.tell_gimbal(&bytes);
                         }
                     }
@@ -73,13 +87,24 @@ impl Line {
             }
             while let Some(bytes) = self.outbox.poll() {
                 busy = true;
-                let frame = DatagramFrames::new(&bytes).next_frame().expect("a frame");
-                self.parameters.handle_received(self.now, &frame);
+                if !self.is_lost() {
+                    self.hear(&bytes);
+                }
             }
             if !busy {
                 return;
             }
         }
+    }
+
+    fn is_lost(&mut self) -> bool {
+        self.loss.as_mut().is_some_and(|(share, random)| random.unit() < *share)
+    }
+
+    /// Somebody sends that on the line.
+    fn hear(&mut self, bytes: &[u8]) {
+        let frame = DatagramFrames::new(bytes).next_frame().expect("a frame");
+        self.parameters.handle_received(self.now, &frame);
     }
 
     fn tell_gimbal(&mut self, bytes: &[u8]) {

@@ -295,6 +295,14 @@ fn what_is_not_done_has_its_status_and_its_reason() {
             json!({"error": "the gimbal did not answer", "reason": "no_answer"}),
         ),
         (
+            NotDone::Operation(OperationError::NoParameters),
+            504,
+            json!({
+                "error": "the gimbal tells no parameters: it has none, or does not hear that it is asked for them",
+                "reason": "no_parameters",
+            }),
+        ),
+        (
             NotDone::Operation(OperationError::NoEffect("RC_TYPE is SBUS".to_owned())),
             502,
             json!({"error": "the gimbal answered, but did not do it: RC_TYPE is SBUS", "reason": "no_effect"}),
