@@ -5,13 +5,15 @@
 //! that, or will not.
 
 mod assumed;
+mod watching;
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
 use self::assumed::{AssumedPose, capabilities};
+use self::watching::{DOES_NOT_MOVE_AND_WHAT_TO_DO, DoesNotMove};
 use super::config::{V1RadioControl, V1Settings};
-use super::obedience::{Finding, Obedience};
+use super::obedience::Obedience;
 use super::packet::{self, MountControl};
 use crate::geometry::{Attitude, GimbalAngles, VehicleFrame};
 use crate::gimbals::boot_clock::BootClock;
@@ -25,7 +27,7 @@ use crate::gimbals::settings::Family;
 use crate::timers::TimerTable;
 use crate::timestamp::Timestamp;
 use crate::wire::dialect::{COMMAND_LONG_DATA, HEARTBEAT_DATA, MOUNT_ORIENTATION_DATA, MOUNT_STATUS_DATA, MessageData};
-use crate::wire::ids::{CommandResult, FailureFlags, GimbalFlags, mav_state, message, mount_mode};
+use crate::wire::ids::{CommandResult, FailureFlags, GimbalFlags, mav_state, message};
 use crate::wire::{Frame, MavId};
 
 /// A gimbal not heard for so long is lost: five heartbeats.
@@ -70,21 +72,6 @@ pub struct MavlinkV1Driver {
     timers: TimerTable<Timer>,
     outputs: VecDeque<DriverOutput>,
 }
-
-/// Whether it is known not to go where it is told to look; the pilot is told once.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct DoesNotMove {
-    is_so: bool,
-    is_told: bool,
-}
-
-/// What the pilot is told of it.
-const DOES_NOT_MOVE: &str = "is told angles but does not move";
-
-/// And what whoever looks into it is.
-const DOES_NOT_MOVE_AND_WHAT_TO_DO: &str = "it is told where to look and does not move. Check that its motors are on and \
-    that nothing blocks the camera; that no radio control of its own has it; that v1_configure is true if it wants \
-    DO_MOUNT_CONFIGURE first; the wire towards it; and its family";
 
 /// Who tells where it looks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -296,25 +283,6 @@ impl MavlinkV1Driver {
 
     fn report(&mut self, report: Report) {
         self.outputs.push_back(DriverOutput::Report(report));
-    }
-
-    /// Looks whether it goes where it was told to look.
-    fn watch_obedience(&mut self, now: Timestamp, frame: &Frame<'_>, attitude: Attitude<VehicleFrame>) {
-        let mode = frame.decode::<MOUNT_STATUS_DATA>().map(|status| status.mount_mode);
-        if mode == Some(mount_mode::RC_TARGETING) || !self.ready {
-            return self.obedience.pause();
-        }
-        let GimbalAngles { pitch, yaw, .. } = attitude.gimbal_angles();
-        match self.obedience.handle_report(now, [pitch, yaw]) {
-            Some(Finding::Moves) => self.does_not_move.is_so = false,
-            Some(Finding::DoesNotMove) => {
-                self.does_not_move.is_so = true;
-                if !std::mem::replace(&mut self.does_not_move.is_told, true) {
-                    self.report(Report::Fault(DOES_NOT_MOVE));
-                }
-            }
-            None => {}
-        }
     }
 
     fn lose(&mut self) {
