@@ -112,6 +112,8 @@ pub struct GimbalManager {
     rules: ControlSettings,
     device: Option<MavId>,
     state: DeviceState,
+    /// It is lost because it was told to shut down.
+    is_shut_down: bool,
     identity: Identity,
     capabilities: Option<Capabilities>,
     readiness: ReadinessWatch,
@@ -172,6 +174,7 @@ impl GimbalManager {
             rules,
             device: None,
             state: DeviceState::Searching,
+            is_shut_down: false,
             identity: Identity::default(),
             capabilities: None,
             readiness: ReadinessWatch::default(),

@@ -32,8 +32,8 @@ const MAX_LEN: usize = 50;
 pub struct Announcements {
     said: Vec<(Key, Timestamp)>,
     allowance: Allowance,
-    /// The manager components whose gimbals were last said to be lost.
-    said_lost: Vec<u8>,
+    /// The manager components whose gimbals were last said to be lost or shut down.
+    said_gone: Vec<u8>,
 }
 
 /// What is not said again within [`AGAIN_AFTER`]: about the gimbal of which manager component, what, and of whom.
@@ -42,6 +42,7 @@ type Key = (u8, Kind, Option<MavId>);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Lost,
+    ShutDown,
     Back,
     Borrowed,
     GivenBack,
@@ -65,18 +66,20 @@ pub struct Subject<'a> {
     pub manager: u8,
     pub name: &'a str,
     pub names: Names,
+    /// It is gone because it was told to shut down.
+    pub is_shut_down: bool,
     pub takeover: Takeover,
     pub autopilot: Option<MavId>,
 }
 
 impl Default for Announcements {
     fn default() -> Self {
-        Self { said: Vec::new(), allowance: Allowance::new(BURST, SPACING), said_lost: Vec::new() }
+        Self { said: Vec::new(), allowance: Allowance::new(BURST, SPACING), said_gone: Vec::new() }
     }
 }
 
 impl Announcements {
-    /// What is said of `event`. That a gimbal is lost or back is said by [`handle_state`](Self::handle_state).
+    /// What is said of `event`. That a gimbal is gone or back is said by [`handle_state`](Self::handle_state).
     pub fn handle_event(&mut self, now: Timestamp, subject: Subject<'_>, event: &Event) -> Option<Announcement> {
         if let Event::Fault { what } = *event {
             return self
@@ -94,16 +97,17 @@ impl Announcements {
             .then(|| Announcement { severity, text: signed(subject.name, &text_of(kind, who, subject.names, event)) })
     }
 
-    /// Says that a gimbal is lost or back; called again and again, so that what could not be said at once is said later,
+    /// Says that a gimbal is lost, shut down or back; called again and again, so that what could not be said at once is said later,
     /// if it still holds.
     pub fn handle_state(&mut self, now: Timestamp, subject: Subject<'_>, state: DeviceState) -> Option<Announcement> {
-        let known = self.said_lost.iter().position(|manager| *manager == subject.manager);
+        let known = self.said_gone.iter().position(|manager| *manager == subject.manager);
         let (kind, severity, text) = match (state, known) {
+            (DeviceState::Lost, None) if subject.is_shut_down => (Kind::ShutDown, severity::NOTICE, "gimbal shut down"),
             (DeviceState::Lost, None) => (Kind::Lost, severity::WARNING, "gimbal lost"),
             (DeviceState::Alive, Some(_)) => (Kind::Back, severity::NOTICE, "gimbal is back"),
             (DeviceState::Searching, Some(at)) => {
-                // Another gimbal has taken the place of the one that was lost.
-                self.said_lost.swap_remove(at);
+                // Another gimbal has taken the place of the one that was gone.
+                self.said_gone.swap_remove(at);
                 return None;
             }
             (DeviceState::Lost, Some(_)) | (DeviceState::Alive | DeviceState::Searching, None) => return None,
@@ -112,8 +116,8 @@ impl Announcements {
             return None;
         }
         match known {
-            Some(at) => drop(self.said_lost.swap_remove(at)),
-            None => self.said_lost.push(subject.manager),
+            Some(at) => drop(self.said_gone.swap_remove(at)),
+            None => self.said_gone.push(subject.manager),
         }
         Some(Announcement { severity, text: signed(subject.name, text) })
     }
@@ -159,6 +163,7 @@ fn text_of(kind: Kind, who: MavId, names: Names, event: &Event) -> String {
     let (who, reason) = (names.of(who), event.reason().unwrap_or_default());
     match kind {
         Kind::Lost => "gimbal lost".to_owned(),
+        Kind::ShutDown => "gimbal shut down".to_owned(),
         Kind::Back => "gimbal is back".to_owned(),
         Kind::Fault(what) => what.to_owned(),
         Kind::Borrowed => "autopilot borrowed control".to_owned(),
@@ -298,7 +303,8 @@ mod tests {
     }
 
     fn subject(manager: u8, takeover: Takeover) -> Subject<'static> {
-        Subject { manager, name: "camera", names: Names::default(), takeover, autopilot: Some(AUTOPILOT) }
+        let (names, autopilot) = (Names::default(), Some(AUTOPILOT));
+        Subject { manager, name: "camera", names, is_shut_down: false, takeover, autopilot }
     }
 
     fn refused(who: MavId) -> Event {

@@ -113,7 +113,7 @@ impl Bridge {
         self.announce_state(now, at);
     }
 
-    /// Says that a gimbal is lost or back, if it is and there is room for it.
+    /// Says that a gimbal is lost, shut down or back, if it is and there is room for it.
     pub(super) fn announce_state(&mut self, now: Timestamp, at: usize) {
         let component = self.roster.get_mut(at).component;
         let names = self.names(component);
@@ -139,7 +139,14 @@ fn is_repetitive(event: &Event) -> bool {
 /// The gimbal as texts about it name it.
 fn subject(gimbal: &Gimbal, names: Names, autopilot: Option<MavId>) -> Subject<'_> {
     let settings = gimbal.manager.settings();
-    Subject { manager: gimbal.component, name: &settings.name, names, takeover: settings.takeover, autopilot }
+    Subject {
+        manager: gimbal.component,
+        name: &settings.name,
+        names,
+        is_shut_down: gimbal.manager.is_shut_down(),
+        takeover: settings.takeover,
+        autopilot,
+    }
 }
 
 impl Entry {

@@ -90,6 +90,8 @@ pub fn state(gimbal: &Gimbal, bootstrap: bool) -> u8 {
         DeviceState::Searching => mav_state::STANDBY,
         DeviceState::Alive if gimbal.manager.has_hard_failure() => mav_state::CRITICAL,
         DeviceState::Alive => mav_state::ACTIVE,
+        // That there is none is what was asked for.
+        DeviceState::Lost if gimbal.manager.is_shut_down() => mav_state::STANDBY,
         DeviceState::Lost => mav_state::CRITICAL,
     }
 }

@@ -36,7 +36,8 @@ pub struct EventSnapshot {
     pub count: u64,
     pub gimbal: String,
     /// `taken`, `taken_over`, `borrowed`, `restored`, `delegated`, `released`, `cleared`, `lapsed`, `holder_restarted`, `system_gone`,
-    /// `refused`, `acquire_war`, `gimbal_found`, `gimbal_back`, `gimbal_lost`, `gimbal_restarted`, `gimbal_ready`, `fault`,
+    /// `refused`, `acquire_war`, `gimbal_found`, `gimbal_back`, `gimbal_lost`, `gimbal_shut_down`, `gimbal_restarted`,
+    /// `gimbal_ready`, `fault`,
     /// `operated`, `operation_failed`, `rates_ended`, `roi_started` or `roi_ended`.
     pub what: String,
     /// Of control: `primary` or `secondary`.
@@ -147,6 +148,14 @@ pub struct GimbalSnapshot {
     /// What only its family knows of it.
     #[serde(default)]
     pub details: GimbalDetails,
+}
+
+impl GimbalSnapshot {
+    /// How it is, for people: its state, or that it was shut down.
+    pub fn condition(&self) -> &str {
+        let is_shut_down = self.state == "lost" && self.details.stage.as_deref() == Some("shut_down");
+        if is_shut_down { "shut down" } else { &self.state }
+    }
 }
 
 /// A gimbal as the autopilot sees it (`[autopilot] present_device`).

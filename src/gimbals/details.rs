@@ -14,7 +14,8 @@ pub struct GimbalDetails {
     pub faults: Vec<String>,
     /// Its parameters by name, as far as they were read.
     pub parameters: BTreeMap<String, f64>,
-    /// How far it has started: `searching`, `reading_parameters`, `aligning` or `running`; `restarting` when it was told to.
+    /// How far it has started: `searching`, `reading_parameters`, `aligning` or `running`; `restarting` when it was told to,
+    /// and `shut_down` after it was told that, until it is heard again.
     pub stage: Option<String>,
     /// Its firmware as its maker writes it, such as `7.8.9 alpha`.
     pub version: Option<String>,

@@ -235,7 +235,7 @@ impl Detection {
                     self.is_reported = true;
                     self.outputs.push_back(output);
                 }
-                DriverOutput::Report(Report::Lost) => {
+                DriverOutput::Report(Report::Lost | Report::ShutDown) => {
                     self.is_reported = false;
                     self.was_lost = true;
                     // What it said speaks for none that comes in its place.

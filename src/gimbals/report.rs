@@ -36,6 +36,8 @@ pub enum Report {
     },
     /// Nothing was heard of it for too long.
     Lost,
+    /// The same of one that was told to shut down, and does it: it is silent until it is switched on.
+    ShutDown,
 }
 
 /// How far a device is on its way to being steered.

@@ -20,7 +20,7 @@ impl Readiness {
             None => format!("link {} is {}", link.name, link.state),
         });
         let gimbals = snapshot.gimbals.iter().filter(|gimbal| gimbal.configured && gimbal.state != "alive");
-        let gimbals = gimbals.map(|gimbal| format!("gimbal {} is {}", gimbal.name, gimbal.state));
+        let gimbals = gimbals.map(|gimbal| format!("gimbal {} is {}", gimbal.name, gimbal.condition()));
         Self::for_reasons(links.chain(gimbals).collect())
     }
 

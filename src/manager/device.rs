@@ -18,7 +18,7 @@ impl GimbalManager {
         if !matches!(report, Report::Attitude(_) | Report::Malformed { .. } | Report::Fault(_)) {
             self.last_command = None;
         }
-        if matches!(report, Report::Restarted | Report::AnotherFamily | Report::Lost) {
+        if matches!(report, Report::Restarted | Report::AnotherFamily | Report::Lost | Report::ShutDown) {
             self.pauses.clear();
         }
         match report {
@@ -53,7 +53,7 @@ impl GimbalManager {
                     self.told_attitude = None;
                 }
                 let known = self.device.replace(device) == Some(device);
-                (self.state, self.is_heard) = (DeviceState::Alive, true);
+                (self.state, self.is_heard, self.is_shut_down) = (DeviceState::Alive, true, false);
                 self.readiness.handle_alive();
                 self.tell(if known { Event::Back { device } } else { Event::Found { device } });
                 self.stop_what_was_left_turning(now);
@@ -106,18 +106,27 @@ impl GimbalManager {
                 }
             }
             Report::Lost => {
-                (self.state, self.is_heard) = (DeviceState::Lost, false);
-                self.status = None;
-                // It may hear us while we do not hear it; and it is stopped when it is heard again.
-                if self.may_be_turning() {
-                    self.stop_at_once();
-                    self.leave_turning();
-                }
-                self.tracking.forget();
+                self.lose();
                 self.tell(Event::Lost { device: self.device });
+            }
+            Report::ShutDown => {
+                self.lose();
+                self.is_shut_down = true;
+                self.tell(Event::ShutDown { device: self.device });
             }
         }
         self.carry_out(now, around);
+    }
+
+    fn lose(&mut self) {
+        (self.state, self.is_heard) = (DeviceState::Lost, false);
+        self.status = None;
+        // It may hear us while we do not hear it; and it is stopped when it is heard again.
+        if self.may_be_turning() {
+            self.stop_at_once();
+            self.leave_turning();
+        }
+        self.tracking.forget();
     }
 
     /// From now on speaks for the gimbal, or leaves that to the gimbal itself.
@@ -162,6 +171,11 @@ impl GimbalManager {
         self.state
     }
 
+    /// It is lost, and that is what was asked of it.
+    pub fn is_shut_down(&self) -> bool {
+        self.is_shut_down
+    }
+
     pub fn identity(&self) -> &Identity {
         &self.identity
     }
@@ -204,6 +218,9 @@ impl GimbalManager {
     /// Whether there is a gimbal that can be steered now.
     pub(super) fn steerable(&self) -> Result<&Capabilities, Refusal> {
         match (self.state, &self.capabilities) {
+            (DeviceState::Lost, _) if self.is_shut_down => {
+                Err(Refusal { result: CommandResult::Failed, reason: "gimbal_shut_down" })
+            }
             (DeviceState::Lost, _) => Err(Refusal { result: CommandResult::Failed, reason: "gimbal_lost" }),
             (DeviceState::Alive, Some(_)) if !self.readiness.is_ready() => Err(Refusal::later("gimbal_starting")),
             (DeviceState::Alive, Some(capabilities)) => {

@@ -36,6 +36,10 @@ pub enum Event {
     Lost {
         device: Option<MavId>,
     },
+    /// It was told to shut down, and is silent since.
+    ShutDown {
+        device: Option<MavId>,
+    },
     /// It does not do any more what it was told.
     Restarted {
         device: Option<MavId>,
@@ -133,6 +137,7 @@ impl Event {
             Self::Found { .. } => "gimbal_found",
             Self::Back { .. } => "gimbal_back",
             Self::Lost { .. } => "gimbal_lost",
+            Self::ShutDown { .. } => "gimbal_shut_down",
             Self::Restarted { .. } => "gimbal_restarted",
             Self::Ready { .. } => "gimbal_ready",
             Self::Fault { .. } => "fault",
@@ -155,7 +160,9 @@ impl Event {
             | Self::RatesEnded { who, .. } => Some(who),
             Self::AcquireWar { holder, .. } => Some(holder),
             Self::Found { device } | Self::Back { device } => Some(device),
-            Self::Lost { device } | Self::Restarted { device } | Self::Ready { device } => device,
+            Self::Lost { device } | Self::ShutDown { device } | Self::Restarted { device } | Self::Ready { device } => {
+                device
+            }
             Self::RoiStarted { who } | Self::RoiEnded { who } => who,
             Self::Fault { .. } => None,
         }
@@ -219,6 +226,9 @@ impl Event {
             Self::Found { device } => format!("gimbal found as {device}"),
             Self::Back { device } => format!("gimbal {device} is back"),
             Self::Lost { .. } => "gimbal lost".to_owned(),
+            Self::ShutDown { .. } => {
+                "gimbal shut down, as it was asked to; it is back when it is switched on".to_owned()
+            }
             Self::Restarted { .. } => "gimbal restarted; it is told nothing until somebody asks".to_owned(),
             Self::Ready { .. } => "gimbal ready: it can be steered".to_owned(),
             Self::Fault { what } => format!("fault: {what}"),
@@ -285,6 +295,7 @@ fn explain(reason: &str) -> String {
         "no_gimbal_yet" => "no gimbal was heard yet",
         "gimbal_unknown_yet" => "the gimbal is heard, and has not told yet what it is",
         "gimbal_starting" => STARTING,
+        "gimbal_shut_down" => "the gimbal was shut down; switch it on",
         "no_attitude" => "the attitude of the gimbal is not known",
         "no_heading" => "the heading of the vehicle is not known",
         "no_home_position" => "the autopilot has not told where home is; it is asked",

@@ -54,7 +54,7 @@ impl fmt::Display for Held {
             let product = [&gimbal.vendor, &gimbal.model].into_iter().flatten();
             let firmware = gimbal.firmware.iter().map(|version| format!("firmware {version}"));
             let family = [gimbal.family.as_str()].into_iter().chain(generation.map(String::as_str)).collect::<Vec<_>>();
-            let told = product.cloned().chain(firmware).chain([gimbal.state.clone()]);
+            let told = product.cloned().chain(firmware).chain([gimbal.condition().to_owned()]);
             let told = [family.join(" ")].into_iter().chain(told).collect::<Vec<_>>().join(", ");
             let device = gimbal.device.as_deref().unwrap_or_default();
             write!(f, "\n  {}: {}", printable_text(device), printable_text(&told))?;

@@ -126,7 +126,7 @@ fn vehicle(out: &mut Lines, vehicle: &VehicleSnapshot) {
 fn gimbal(out: &mut Lines, gimbal: &GimbalSnapshot) {
     let device = gimbal.device.as_ref().map(|id| format!("  device {id}")).unwrap_or_default();
     let manager = gimbal.manager_component_id;
-    let title = format!("gimbal {}  {}  {}{device}  manager {manager}", gimbal.name, gimbal.state, gimbal.family);
+    let title = format!("gimbal {}  {}  {}{device}  manager {manager}", gimbal.name, gimbal.condition(), gimbal.family);
     out.heading(&title);
     let product = [&gimbal.vendor, &gimbal.model, &gimbal.firmware];
     let product = product.into_iter().flatten().map(String::as_str).collect::<Vec<_>>().join(" ");

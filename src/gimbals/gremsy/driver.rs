@@ -74,6 +74,8 @@ pub struct GremsyDriver {
     is_reported: bool,
     /// It was told to start again, or to switch itself off, and has not been heard since.
     off: Option<Off>,
+    /// It is lost because it was told to switch itself off.
+    is_gone_as_told: bool,
     begun: Timestamp,
     asked: u8,
     information: Option<DeviceInformation>,
@@ -169,6 +171,7 @@ impl GremsyDriver {
             is_alive: false,
             is_reported: false,
             off: None,
+            is_gone_as_told: false,
             begun: Timestamp::ZERO,
             asked: 0,
             information: None,
@@ -345,7 +348,7 @@ impl GimbalDriver for GremsyDriver {
                 self.report_alive(device);
             }
             self.forget_conversation();
-            self.outputs.push_back(DriverOutput::Report(Report::Lost));
+            self.report_gone();
         }
     }
 

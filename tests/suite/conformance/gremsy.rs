@@ -8,6 +8,7 @@ mod faults;
 mod motors;
 mod operations;
 mod restarting;
+mod shutting_down;
 mod start_up;
 mod steering;
 mod stopping;

@@ -58,7 +58,9 @@ impl GremsyDriver {
     }
 
     fn stage(&self) -> &'static str {
-        if !self.is_alive || self.off.is_some_and(|off| !off.comes_back) {
+        if self.is_shut_down() {
+            "shut_down"
+        } else if !self.is_alive {
             "searching"
         } else if self.off.is_some() {
             "restarting"

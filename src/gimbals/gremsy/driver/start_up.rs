@@ -29,6 +29,7 @@ impl GremsyDriver {
         self.aligned_since = None;
         self.is_present = false;
         self.off = None;
+        self.is_gone_as_told = false;
         // To whoever steers, the first start is none of a gimbal that was there before.
         self.is_start_told = self.reported.is_none();
         self.end_moves();

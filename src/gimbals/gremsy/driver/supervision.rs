@@ -119,12 +119,23 @@ impl GremsyDriver {
             self.report_alive(device);
         }
         self.forget_conversation();
-        self.outputs.push_back(DriverOutput::Report(Report::Lost));
+        self.report_gone();
+    }
+
+    /// It was told to switch itself off, does that, and was not heard since.
+    pub(super) fn is_shut_down(&self) -> bool {
+        self.is_gone_as_told || self.off.is_some_and(|off| !off.comes_back)
+    }
+
+    pub(super) fn report_gone(&mut self) {
+        let report = if self.is_gone_as_told { Report::ShutDown } else { Report::Lost };
+        self.outputs.push_back(DriverOutput::Report(report));
     }
 
     pub(super) fn forget_conversation(&mut self) {
         self.is_alive = false;
         self.is_reported = false;
+        self.is_gone_as_told = self.is_shut_down();
         self.off = None;
         self.is_present = false;
         self.mount.handle_lost();
