@@ -48,8 +48,8 @@ pub trait GimbalDriver: std::fmt::Debug {
         false
     }
 
-    /// The family whose words stop it, where the configuration leaves that open and it is known: the next run stops in these
-    /// words what this one could not.
+    /// The family whose words stop it where those of a v2 device do not, by the configuration or as it was found out: the
+    /// next run stops in these words what this one could not, also where its configuration does not name it.
     fn stops_as(&self) -> Option<Family> {
         None
     }

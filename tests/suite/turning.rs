@@ -11,6 +11,7 @@ use std::time::Duration;
 use gimbald::bridge::settings::Settings;
 use gimbald::geometry::Angle;
 use gimbald::gimbals::gremsy::sim as gremsy;
+use gimbald::gimbals::gremsy::version::FirmwareVersion;
 use gimbald::gimbals::mavlink_v2::sim as v2;
 use gimbald::sim::plant::PlantSettings;
 use gimbald::sim::vehicle::{Vehicle, VehicleSettings};
@@ -31,6 +32,8 @@ enum Kind {
     V2Device,
     GremsyV1,
     GremsyV2,
+    /// A v1 Gremsy whose firmware of 2021 answers no `GIMBAL_DEVICE_INFORMATION`, so that its parameters have to tell what it is.
+    OldGremsy,
 }
 
 const KINDS: [Kind; 3] = [Kind::V2Device, Kind::GremsyV1, Kind::GremsyV2];
@@ -54,11 +57,11 @@ impl Gimbal {
     fn install(world: &mut World, place: Place, kind: Kind, component_id: u8) -> (Self, Cable) {
         let cable = Cable::default();
         let now = world.now;
-        let gremsy = |generation| {
-            let settings = gremsy::DeviceSettings::of(generation);
+        let gremsy = |settings: gremsy::DeviceSettings| {
             let plant = PlantSettings { noise: Angle::ZERO, ..settings.plant.clone() };
             gremsy::Device::new(now, gremsy::DeviceSettings { component_id, plant, ..settings })
         };
+        let [v1_gremsy, v2_gremsy] = [gremsy::Generation::V1, gremsy::Generation::V2].map(gremsy::DeviceSettings::of);
         let gimbal = match kind {
             Kind::V2Device => {
                 let settings = v2::DeviceSettings::default();
@@ -66,8 +69,12 @@ impl Gimbal {
                 let settings = v2::DeviceSettings { component_id, rate_expiry: None, plant, ..settings };
                 Self::V2Device(Watched::new(v2::Device::new(now, settings)))
             }
-            Kind::GremsyV1 => Self::Gremsy(Watched::new(gremsy(gremsy::Generation::V1))),
-            Kind::GremsyV2 => Self::Gremsy(Watched::new(gremsy(gremsy::Generation::V2))),
+            Kind::GremsyV1 => Self::Gremsy(Watched::new(gremsy(v1_gremsy))),
+            Kind::GremsyV2 => Self::Gremsy(Watched::new(gremsy(v2_gremsy))),
+            Kind::OldGremsy => {
+                let firmware = FirmwareVersion::official(7, 5, 6);
+                Self::Gremsy(Watched::new(gremsy(gremsy::DeviceSettings { firmware, ..v1_gremsy })))
+            }
         };
         match gimbal.clone() {
             Self::V2Device(peer) => world.install(place, Intercepted::new(peer, cable.clone())),

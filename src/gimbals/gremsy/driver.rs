@@ -401,6 +401,10 @@ impl GimbalDriver for GremsyDriver {
         self.go_on(now);
     }
 
+    fn stops_as(&self) -> Option<Family> {
+        Some(Family::Gremsy)
+    }
+
     fn may_be_turning(&self) -> bool {
         self.mount.may_be_turning() || self.turning.is_some() || self.stopping.is_some()
     }

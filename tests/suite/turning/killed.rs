@@ -1,6 +1,6 @@
 //! The daemon is killed while it turns, and what it left behind is read by the next.
 
-use gimbald::gimbals::settings::GimbalSettings;
+use gimbald::gimbals::settings::{Family, GimbalSettings};
 
 use super::*;
 
@@ -111,6 +111,25 @@ fn who_is_waited_for_is_kept_for_the_next_start_too() {
             two.flight.run_for(10 * SECOND);
             assert_eq!(two.flight.world.stored_turning, Vec::<String>::new(), "{what}");
         }
+    }
+}
+
+/// "The next start tells them to stop at the first sign of them": in the words of the family that was configured, also where
+/// no entry names it any more, without finding out first what it speaks.
+#[test]
+fn a_family_that_was_configured_is_kept_for_the_next_start() {
+    for kind in [Kind::GremsyV1, Kind::GremsyV2, Kind::OldGremsy] {
+        let camera = GimbalSettings { family: Family::Gremsy, ..GimbalSettings::found("camera".to_owned()) };
+        let mut flight = Flight::turning_with(kind, Settings { gimbals: vec![camera], ..three_links() });
+        assert_eq!(flight.world.stored_turning, ["camera\t1/154\tgremsy"], "{kind:?}");
+        flight.world.kill();
+        flight.run_for(SECOND / 2);
+        let left_turning = flight.world.stored_turning.clone();
+        flight.world.start(Settings { left_turning, ..three_links() });
+        flight.run_for(SECOND);
+        flight.assert_rests(&format!("{kind:?}"));
+        flight.run_for(20 * SECOND);
+        assert_eq!(flight.world.stored_turning, Vec::<String>::new(), "{kind:?}");
     }
 }
 

@@ -131,7 +131,7 @@ fn at_the_end_it_is_told_to_stop_again_and_again() {
 
         assert!(world.bridge.is_finished());
         let (commands, setpoints) = orders(&mut world, places);
-        assert_eq!(world.stored_turning, ["camera\t1/154"], "{generation:?}");
+        assert_eq!(world.stored_turning, ["camera\t1/154\tgremsy"], "{generation:?}");
         let zeros = match generation {
             Generation::V1 => {
                 assert!(commands.iter().all(|told| *told == packet::turn_at(GIMBAL, [AngularRate::ZERO; 3])));
@@ -162,7 +162,7 @@ fn what_an_operation_interrupts_counts_as_turning_for_a_while() {
         for (id, asked) in (1..).zip(&asks) {
             world.input(Input::Asked { id: OperationId(id), gimbal: "camera", asked });
             run(&mut world, places, SECOND / 2);
-            assert_eq!(world.stored_turning, ["camera\t1/154"], "{generation:?} {asked:?}");
+            assert_eq!(world.stored_turning, ["camera\t1/154\tgremsy"], "{generation:?} {asked:?}");
         }
         run(&mut world, places, 8 * SECOND);
         assert!(world.answers.contains(&(OperationId(2), Ok(()))), "{:?}", world.answers);

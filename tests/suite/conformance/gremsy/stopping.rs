@@ -173,7 +173,7 @@ fn what_it_answers_to_another_does_not_tell_that_it_has_stopped() {
             world.send(places.gimbal, GIMBAL, &MavMessage::COMMAND_ACK(ack));
         }
         run(&mut world, places, SECOND);
-        let noted: &[&str] = if may_be_turning { &["camera\t1/154"] } else { &[] };
+        let noted: &[&str] = if may_be_turning { &["camera\t1/154\tgremsy"] } else { &[] };
         assert_eq!(world.stored_turning, noted, "{target:?}");
     }
 }
