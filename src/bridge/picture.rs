@@ -196,12 +196,14 @@ fn setpoint_snapshot(tracking: &Tracking, names: Names) -> Option<SetpointSnapsh
     };
     Some(match tracking.last() {
         Some(Setpoint::Point(pointing)) => SetpointSnapshot {
+            roll_deg: Some(pointing.roll.degrees()),
             pitch_deg: Some(pointing.pitch.degrees()),
             yaw_deg: Some(pointing.yaw.angle().degrees()),
             yaw_frame: Some(frame_name(pointing.yaw.frame())),
             ..bare
         },
         Some(Setpoint::Turn(turning)) => SetpointSnapshot {
+            roll_rate_dps: turning.roll.map(AngularRate::degrees_per_second),
             pitch_rate_dps: Some(turning.pitch.degrees_per_second()),
             yaw_rate_dps: Some(turning.yaw.degrees_per_second()),
             yaw_frame: Some(frame_name(turning.yaw_frame)),

@@ -186,10 +186,14 @@ pub struct AttitudeSnapshot {
 pub struct SetpointSnapshot {
     /// `angle`, `rate`, `hold`, `retract`, `neutral` or `roi`.
     pub mode: String,
+    #[serde(default)]
+    pub roll_deg: Option<f64>,
     pub pitch_deg: Option<f64>,
     pub yaw_deg: Option<f64>,
     /// `vehicle` or `earth`.
     pub yaw_frame: Option<String>,
+    #[serde(default)]
+    pub roll_rate_dps: Option<f64>,
     pub pitch_rate_dps: Option<f64>,
     pub yaw_rate_dps: Option<f64>,
     /// Whose demand it is, as `system/component`.

@@ -93,9 +93,11 @@ fn held_gimbal() -> GimbalSnapshot {
         },
         setpoint: Some(SetpointSnapshot {
             mode: "angle".into(),
+            roll_deg: Some(2.0),
             pitch_deg: Some(-45.0),
             yaw_deg: Some(120.0),
             yaw_frame: Some("earth".into()),
+            roll_rate_dps: None,
             pitch_rate_dps: None,
             yaw_rate_dps: None,
             source: Some("255/190".into()),

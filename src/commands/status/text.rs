@@ -192,9 +192,13 @@ fn events(out: &mut Lines, events: &[EventSnapshot]) {
 
 fn setpoint(setpoint: &SetpointSnapshot) -> String {
     let mut text = setpoint.mode.clone();
+    // Level is how a camera is nearly always told to be.
+    let tilted = |roll: Option<f64>| roll.filter(|roll| roll.abs() > 0.05);
     for (name, value, unit) in [
+        ("roll", tilted(setpoint.roll_deg), ""),
         ("pitch", setpoint.pitch_deg, ""),
         ("yaw", setpoint.yaw_deg, ""),
+        ("roll", tilted(setpoint.roll_rate_dps), "/s"),
         ("pitch", setpoint.pitch_rate_dps, "/s"),
         ("yaw", setpoint.yaw_rate_dps, "/s"),
     ] {

@@ -54,8 +54,8 @@ fn status_is_the_whole_snapshot() {
                     "age_ms": 18,
                 },
                 "setpoint": {
-                    "mode": "angle", "pitch_deg": -45.0, "yaw_deg": 120.0, "yaw_frame": "earth",
-                    "pitch_rate_dps": null, "yaw_rate_dps": null, "source": "255/190", "stale": false,
+                    "mode": "angle", "roll_deg": 2.0, "pitch_deg": -45.0, "yaw_deg": 120.0, "yaw_frame": "earth",
+                    "roll_rate_dps": null, "pitch_rate_dps": null, "yaw_rate_dps": null, "source": "255/190", "stale": false,
                     "nudge_pitch_deg": -2.5, "nudge_yaw_deg": 0.0,
                 },
                 "primary": "255/190", "secondary": null, "primary_age_ms": 61_500, "secondary_age_ms": null,

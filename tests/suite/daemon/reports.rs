@@ -72,9 +72,11 @@ const GIMBAL: &[&str] = &[
 const ATTITUDE: &[&str] = &["roll_deg", "pitch_deg", "yaw_vehicle_deg", "yaw_earth_deg", "assumed", "age_ms"];
 const SETPOINT: &[&str] = &[
     "mode",
+    "roll_deg",
     "pitch_deg",
     "yaw_deg",
     "yaw_frame",
+    "roll_rate_dps",
     "pitch_rate_dps",
     "yaw_rate_dps",
     "source",

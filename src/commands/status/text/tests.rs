@@ -28,7 +28,7 @@ gimbal camera  alive  mavlink_v2  device 1/154  manager 191
   product   Acme Pixy 7.8.1
   attitude  roll 0.3°  pitch -42.5°  yaw 30.0° from the nose, 117.0° from North  18 ms ago
   control   255/190 for 1 min 1 s
-  setpoint  angle  pitch -45.0°  yaw 120.0° from North  by 255/190
+  setpoint  angle  roll 2.0°  pitch -45.0°  yaw 120.0° from North  by 255/190
   autopilot sees it as 1/154, asks for nothing new
   roi       47.400000° 8.550000°  430.0 m above mean sea level
   fault     firmware 7.8.7 reports a wrong yaw from North

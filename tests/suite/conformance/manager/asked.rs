@@ -95,6 +95,38 @@ fn http_holds_control_as_everybody_does() {
     assert_eq!(told_control(&world.take(places.ground)), Some((NOBODY, NOBODY)));
 }
 
+/// "`setpoint`: what it is told": its roll as well, an angle (level unless somebody asks for another) or a rate, where one is
+/// demanded.
+#[test]
+fn the_status_tells_the_roll_that_is_demanded() {
+    let (mut world, _) = with_gimbal();
+    let degrees_per_second = AngularRate::from_degrees_per_second;
+    let rolled =
+        Asked::Point { roll: angle(10.0), pitch: angle(-30.0), yaw: angle(20.0), yaw_frame: YawFrame::Vehicle };
+    let rolling = Asked::Turn {
+        roll: Some(degrees_per_second(5.0)),
+        pitch: AngularRate::ZERO,
+        yaw: degrees_per_second(10.0),
+        yaw_frame: YawFrame::Vehicle,
+    };
+    for (asked, mode, roll_deg, roll_rate_dps) in [
+        (rolled, "angle", Some(10.0), None),
+        (down_to_the_right(), "angle", Some(0.0), None),
+        (rolling, "rate", None, Some(5.0)),
+        (turn_right(), "rate", None, None),
+        (Asked::Neutral, "neutral", None, None),
+    ] {
+        assert_eq!(ask(&mut world, &asked), Ok(()));
+        let told = world.snapshot().gimbals.remove(0).setpoint.expect("it is told");
+        let round = |value: Option<f64>| value.map(|value| value.round() + 0.0);
+        assert_eq!(
+            (told.mode.as_str(), round(told.roll_deg), round(told.roll_rate_dps)),
+            (mode, roll_deg, roll_rate_dps),
+            "{asked:?}"
+        );
+    }
+}
+
 /// D4: "Someone else holds it: commands DENIED … counted per sender with the reason and shown", whatever is asked.
 #[test]
 fn who_is_not_in_control_is_refused_and_counted() {
