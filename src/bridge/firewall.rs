@@ -63,6 +63,11 @@ impl Bridge {
             _ if is_for_mounts(frame) || self.is_of_a_vendor(frame) => {
                 self.keep_from_devices(now, place, frame, channels)
             }
+            // R15: it is for the managers, which have a gate; a gimbal that knows it as well has none.
+            _ if self.settings.control.firewall == Firewall::On && is_for_every_manager(frame) => {
+                let gimbals = channels.intersection(self.channels.with_role(Role::Gimbal));
+                self.drop_towards(channels, gimbals, "firewall")
+            }
             _ => channels,
         }
     }
@@ -134,6 +139,23 @@ impl Bridge {
             self.conflicts.note(now, Conflict::RivalManager { rival, device_id, autopilot });
         }
     }
+}
+
+/// Whether it says to everybody where to look, or who says that.
+fn is_for_every_manager(frame: &Frame<'_>) -> bool {
+    let is_demand = matches!(
+        command_number(frame),
+        Some(
+            command::DO_SET_ROI_LOCATION
+                | command::DO_SET_ROI_WPNEXT_OFFSET
+                | command::DO_SET_ROI_NONE
+                | command::DO_SET_ROI_SYSID
+                | command::DO_SET_ROI
+                | command::DO_GIMBAL_MANAGER_PITCHYAW
+                | command::DO_GIMBAL_MANAGER_CONFIGURE
+        )
+    );
+    is_demand && !matches!(frame.target(), Target::Component(_))
 }
 
 /// Of which gimbal a manager speaks in 280 or 281.

@@ -146,6 +146,9 @@ pub struct Roster {
     /// Devices that are not adopted yet, and when each was first heard.
     waiting: Vec<(MavId, Timestamp)>,
     /// Components of type gimbal that manage a gimbal without MAVLink.
+    /// The device id that is kept for each entry whose family is found out, in case that it is no v2 device: whoever learned
+    /// an id goes by it for good, so it does not depend on which of them is found first.
+    spoken_for: Vec<Option<u8>>,
     self_managed: Vec<MavId>,
 }
 
@@ -157,6 +160,7 @@ impl Roster {
             left_turning: Awaited::read(&settings.left_turning),
             open: ChannelSet::EMPTY,
             waiting: Vec::new(),
+            spoken_for: Vec::new(),
             self_managed: Vec::new(),
         };
         let mut wanted: Vec<Option<u8>> = settings
@@ -171,7 +175,7 @@ impl Roster {
             }
         }
         // "1 to 6, its place among the non-v2 gimbals."
-        let mut numbers = 1..=voice::LAST_NUMBER;
+        let mut numbers = (1..=voice::LAST_NUMBER).peekable();
         for (gimbal, component) in settings.gimbals.iter().zip(wanted) {
             let component = component.expect("the configuration was refused when a manager component is missing");
             let number = gimbal.family.may_speak_through_manager().then(|| {
@@ -179,6 +183,8 @@ impl Roster {
             });
             roster.gimbals.push(Gimbal::new(gimbal.clone(), &settings.control, component, true, number));
         }
+        let is_open = |gimbal: &GimbalSettings| gimbal.family == Family::Auto;
+        roster.spoken_for = settings.gimbals.iter().map(|gimbal| numbers.next_if(|_| is_open(gimbal))).collect();
         roster.ensure_first_manager();
         roster.stop_entries_left_turning();
         roster
@@ -200,14 +206,17 @@ impl Roster {
         &mut self.gimbals[at]
     }
 
-    /// Keeps the next free device id for a gimbal that turned out to be no v2 device. The seventh has none, and so is not
-    /// told of.
+    /// Keeps a device id for a gimbal that turned out to be no v2 device: its own, or the next that is free. The seventh has
+    /// none, and so is not told of.
     pub fn keep_number(&mut self, at: usize) {
         if self.gimbals[at].manager.kept_number().is_some() {
             return;
         }
-        let kept = |number: &u8| self.gimbals.iter().any(|gimbal| gimbal.manager.kept_number() == Some(*number));
-        if let Some(number) = (1..=voice::LAST_NUMBER).find(|number| !kept(number)) {
+        let is_kept = |number: &u8| self.gimbals.iter().any(|gimbal| gimbal.manager.kept_number() == Some(*number));
+        let is_spoken_for = |number: &u8| self.spoken_for.contains(&Some(*number));
+        let free = || (1..=voice::LAST_NUMBER).filter(|number| !is_kept(number));
+        let own = self.spoken_for.get(at).copied().flatten().filter(|number| !is_kept(number));
+        if let Some(number) = own.or_else(|| free().find(|number| !is_spoken_for(number))).or_else(|| free().next()) {
             self.gimbals[at].manager.keep_number(number);
         }
     }

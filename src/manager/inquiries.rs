@@ -51,8 +51,13 @@ impl GimbalManager {
             }
             id => return not_ours(command, id),
         };
+        let is_of_device =
+            matches!(*message, MavMessage::GIMBAL_DEVICE_INFORMATION(_) | MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(_));
         self.outputs.push_back(if to_everybody {
             ManagerOutput::Broadcast { channels: None, message }
+        } else if is_of_device && !command.is_directed() {
+            // Who asks everybody may have another device of this gimbal's where it is.
+            ManagerOutput::Broadcast { channels: Some(sender.channel.into()), message }
         } else {
             ManagerOutput::Answer { channel: sender.channel, message }
         });

@@ -13,6 +13,7 @@ use gimbald::gimbals::gremsy::sim as gremsy;
 use gimbald::gimbals::gremsy::version::FirmwareVersion;
 use gimbald::gimbals::mavlink_v1::sim::{Device, DeviceSettings, Feedback};
 use gimbald::gimbals::mavlink_v2::sim as v2;
+use gimbald::gimbals::settings::GimbalSettings;
 use gimbald::sim::plant::PlantSettings;
 use gimbald::sim::vehicle::{Vehicle, VehicleSettings};
 use gimbald::timestamp::Timestamp;
@@ -90,6 +91,36 @@ fn a_gimbal_that_tells_its_attitude_by_v1_is_a_v1_gimbal() {
     let statuses: Vec<GIMBAL_DEVICE_ATTITUDE_STATUS_DATA> = of(&from_manager(world.take(places.ground)));
     let (pitch, yaw) = pitch_yaw_deg(statuses.last().expect("285 is streamed").q);
     assert!((pitch + 30.0).abs() < 0.5 && (yaw - 20.0).abs() < 0.5, "{pitch} {yaw}");
+}
+
+/// "our ids must be stable: PX4 latches (sysid, compid, device id) for good" (notes on peers 2.2): which of two entries
+/// without a family is found first says nothing of their ids, nor does one that is described by none.
+#[test]
+fn ids_do_not_depend_on_who_is_found_first() {
+    let entry = |name: &str, component_id| GimbalSettings {
+        component_id: Some(component_id),
+        ..GimbalSettings::found(name.to_owned())
+    };
+    let device = |component| {
+        Device::new(
+            Timestamp::ZERO,
+            DeviceSettings { component_id: component, feedback: Feedback::Orientation, ..DeviceSettings::default() },
+        )
+    };
+    for order in [[171, 172, 173], [173, 172, 171], [172, 173, 171]] {
+        let settings = Settings { gimbals: vec![entry("a", 171), entry("b", 172)], ..three_links() };
+        let (mut world, places) = World::empty(settings);
+        world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
+        for component in order {
+            world.install(places.gimbal, device(component));
+            run(&mut world, places, 12 * SECOND);
+            world.remove(places.gimbal);
+        }
+        let ids: Vec<(String, Option<u8>)> =
+            world.snapshot().gimbals.into_iter().map(|gimbal| (gimbal.name, gimbal.device_id)).collect();
+        let expected = [("a", Some(1)), ("b", Some(2)), ("gimbal-173", Some(3))];
+        assert_eq!(ids, expected.map(|(name, id)| (name.to_owned(), id)), "{order:?}");
+    }
 }
 
 /// A v1 gimbal need not report anything ("Optionally report MOUNT_STATUS and/or MOUNT_ORIENTATION").

@@ -66,6 +66,26 @@ fn item_153_with_warn_it_is_forwarded_and_told() {
     assert!(conflicts.len() == 1 && conflicts[0].contains("fight with ours"), "{conflicts:?}");
 }
 
+/// D5: "Nothing moves the gimbal that did not pass" the gate: a gimbal may know the commands to managers as well. Everybody
+/// else gets them, and so does a gimbal that is named.
+#[test]
+fn d5_what_is_said_to_every_manager_reaches_no_gimbal() {
+    for number in [195, 196, 197, 198, 201, 1000, 1001] {
+        for form in [COMMAND_LONG, COMMAND_INT] {
+            let mut rig = rig(Firewall::On);
+            for (count, target) in [(1, 0), (0, 0)].into_iter().enumerate() {
+                let told = rig.deliver_amid_ours("ground", &command(GROUND, form, number, target));
+                assert!(told.contains(&"autopilot") && !told.contains(&"gimbal"), "{number} {target:?} {told:?}");
+                assert_eq!(rig.dropped("gimbal", "firewall"), count as u64 + 1);
+            }
+            assert_eq!(rig.deliver("ground", &command(GROUND, form, number, (1, 154))), ["gimbal"], "{number}");
+            assert_eq!(rig.world.snapshot().conflicts, [""; 0]);
+        }
+    }
+    let mut warns = self::rig(Firewall::Warn);
+    assert!(warns.deliver_amid_ours("ground", &command(GROUND, COMMAND_LONG, 195, (1, 0))).contains(&"gimbal"));
+}
+
 /// The firewall is about the devices that we manage, on whatever link they are, and about nothing else.
 #[test]
 fn item_153_other_devices_and_other_commands_pass() {

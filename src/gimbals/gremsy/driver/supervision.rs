@@ -21,6 +21,9 @@ const REBOOT_TAKES_AT_LEAST: Duration = Duration::from_secs(1);
 /// One that was silent for so long after it was told to start again has done so; others were never off.
 const REBOOT_IS_SILENT_FOR: Duration = Duration::from_secs(3);
 
+/// A gimbal that is there says something more often, its heartbeat and its status if nothing else.
+const HEARD_EVERY: Duration = Duration::from_millis(1500);
+
 /// A gimbal should have become ready by then, or at least have told its status.
 const READY_WITHIN: Duration = Duration::from_secs(20);
 const STATUS_WITHIN: Duration = Duration::from_secs(10);
@@ -220,7 +223,8 @@ impl GremsyDriver {
         if is_v2 && waited >= READY_WITHIN && self.heard.device_status.is_none() {
             self.raise(Fault::NoAttitude);
         }
-        if self.mount.is_unanswered(now) {
+        // One that says nothing at all is not there.
+        if self.mount.is_unanswered(now) && now.since(self.heard.latest) < HEARD_EVERY {
             self.raise(Fault::NoAnswers);
         }
     }

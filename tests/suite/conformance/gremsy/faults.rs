@@ -225,6 +225,19 @@ fn a_gimbal_that_does_not_answer_is_named() {
     assert!(commands.iter().all(|command| command.command == command::USER_2), "{commands:?}");
 }
 
+/// One that is switched off just after it was told something is not there, which is no fault of its wires.
+#[test]
+fn a_gimbal_that_is_gone_is_lost_and_nothing_else() {
+    let (mut world, places) = running(Generation::V1);
+    demand(&mut world, places, [-30.0, 60.0, NAN, NAN, 0.0]);
+    run(&mut world, places, SECOND);
+    world.remove(places.gimbal);
+    world.forget();
+    run(&mut world, places, 10 * SECOND);
+    assert_eq!(texts(&world, places), ["camera: gimbal lost"]);
+    assert_eq!(faults(&world), [""; 0]);
+}
+
 /// "details.faults: Faults of this gimbal or its firmware, and what to do about them": a family that does not fit is the
 /// first thing that whoever configures a gimbal gets wrong.
 #[test]

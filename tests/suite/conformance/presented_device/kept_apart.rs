@@ -2,18 +2,19 @@
 
 use gimbald::bridge::Input;
 use gimbald::bridge::settings::{Role, Settings, SystemId, Transport};
+use gimbald::timestamp::Timestamp;
 use gimbald::wire::MavId;
 use gimbald::wire::dialect::{
     AUTOPILOT_STATE_FOR_GIMBAL_DEVICE_DATA, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA,
     GIMBAL_MANAGER_INFORMATION_DATA, GIMBAL_MANAGER_STATUS_DATA, MavMessage,
 };
 
-use super::{PERIOD, SECOND, introduce, of_device, presenting, setpoint, with_device};
+use super::{EVERYBODY, PERIOD, SECOND, introduce, of_device, presenting, setpoint, with_device};
 use crate::support::script::{
     ardupilot_heartbeat, autopilot_state, command_long, device_information, device_status, gimbal_heartbeat, ids,
-    usual_capabilities,
+    request_message, usual_capabilities,
 };
-use crate::support::world::{AUTOPILOT, GCS, GIMBAL, World, link};
+use crate::support::world::{AUTOPILOT, GCS, GIMBAL, MANAGER, World, link};
 
 /// "The real 154 (its heartbeat, 283, 285, everything from it) is not forwarded to the autopilot's link"; others get it as
 /// ever. Counted.
@@ -34,6 +35,24 @@ fn the_real_gimbal_is_not_seen_by_the_autopilot() {
     let dropped = &world.snapshot().links[0].dropped;
     // Three of them were there before, when the gimbal introduced itself.
     assert_eq!(dropped.get("presented_instead"), Some(&7), "{dropped:?}");
+}
+
+/// Nor does the manager speak there for a gimbal that is no v2 device: who asks everybody for 283, as PX4 does, hears of one
+/// device. A ground station that asks everybody elsewhere hears of the gimbal.
+#[test]
+fn who_asks_everybody_hears_of_one_device() {
+    use gimbald::gimbals::mavlink_v1::sim::{Device, DeviceSettings};
+    let (mut world, places) = World::empty(presenting());
+    world.install(places.gimbal, Device::new(Timestamp::ZERO, DeviceSettings::default()));
+    world.run_with(15 * SECOND, &[(SECOND, places.autopilot, AUTOPILOT, ardupilot_heartbeat())]);
+    assert_eq!(world.snapshot().gimbals[0].family, "mavlink_v1");
+    world.forget();
+    let question = request_message(EVERYBODY, 283);
+    for (place, asker, from) in [(places.autopilot, AUTOPILOT, GIMBAL), (places.ground, GCS, MANAGER)] {
+        let answers = world.ask(place, asker, &question);
+        let told = answers.iter().filter(|arrival| arrival.id() == 283);
+        assert_eq!(told.map(|arrival| arrival.source()).collect::<Vec<_>>(), [from]);
+    }
 }
 
 /// Also while our system id is not settled, so that the device is not presented yet: ArduPilot would take what it sees in the
