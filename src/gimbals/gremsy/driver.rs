@@ -376,7 +376,7 @@ impl GimbalDriver for GremsyDriver {
         if asked == packet::hand_to_rc(device) && self.hand_over == HandOver::Asked {
             self.hand_over = if is_done { HandOver::Done } else { HandOver::Refused };
         }
-        self.mount.handle_outcome(now, device, command, is_done);
+        self.mount.handle_outcome(now, device, command, outcome);
         self.handle_operation_outcome(now, command, outcome);
         self.go_on(now);
     }

@@ -14,11 +14,13 @@ pub use self::order::Order;
 
 use super::rotation::Rotation;
 use crate::geometry::AngularRate;
+use crate::gimbals::driver::CommandOutcome;
 use crate::gimbals::gremsy::packet;
 use crate::gimbals::operation::YawMode;
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 use crate::wire::dialect::COMMAND_LONG_DATA;
+use crate::wire::ids::CommandResult;
 
 /// Another order is sent at most so soon after one: 25 times a second.
 const LEAST_INTERVAL: Duration = Duration::from_millis(40);
@@ -74,6 +76,8 @@ pub enum MountOutput {
     ModeTaken,
     /// Its motors do not come back after they were switched off by an order.
     StaysRetracted,
+    /// It does not answer a command that has to be answered before it is told where to look.
+    Unanswered,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -226,28 +230,40 @@ impl Mount {
         self.unanswered >= UNANSWERED && now.since(self.unanswered_since) >= UNANSWERED_FOR
     }
 
+    /// It was told where to look, and does not leave what it is told unanswered.
+    pub fn has_heard(&self) -> bool {
+        self.sent.is_some_and(|(_, sent)| self.wanted == Some(sent)) && self.unanswered < UNANSWERED
+    }
+
     /// What became of a command of [`MountOutput::Command`]; false for one that is none of these.
-    pub fn handle_outcome(&mut self, now: Timestamp, device: MavId, command: &COMMAND_LONG_DATA, done: bool) -> bool {
+    pub fn handle_outcome(
+        &mut self,
+        now: Timestamp,
+        device: MavId,
+        command: &COMMAND_LONG_DATA,
+        outcome: CommandOutcome,
+    ) -> bool {
         let is = |of: &COMMAND_LONG_DATA| {
             (of.command, of.param1, of.param6, of.param7)
                 == (command.command, command.param1, command.param6, command.param7)
         };
+        let is_done = outcome == CommandOutcome::Answered(CommandResult::Accepted as u8);
+        let or_unanswered = |output: MountOutput| match outcome {
+            CommandOutcome::Unanswered => MountOutput::Unanswered,
+            CommandOutcome::Answered(_) => output,
+        };
         if let Mode::Asked(mode) = self.mode
             && is(&mode_command(device, mode))
         {
-            if done {
-                self.mode = Mode::Is(mode);
-                self.outputs.push_back(MountOutput::ModeTaken);
-            } else {
-                self.mode = Mode::Refused(mode, now);
-                self.outputs.push_back(MountOutput::ModeRefused);
-            }
+            let output = if is_done { MountOutput::ModeTaken } else { or_unanswered(MountOutput::ModeRefused) };
+            self.mode = if is_done { Mode::Is(mode) } else { Mode::Refused(mode, now) };
+            self.outputs.push_back(output);
             return true;
         }
         if matches!(self.retraction, Retraction::Returning { .. }) && is(&packet::set_motors(device, true)) {
-            if !done {
+            if !is_done {
                 self.retraction = Retraction::Off;
-                self.outputs.push_back(MountOutput::StaysRetracted);
+                self.outputs.push_back(or_unanswered(MountOutput::StaysRetracted));
             }
             return true;
         }

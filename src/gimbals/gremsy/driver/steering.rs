@@ -279,7 +279,7 @@ impl GremsyDriver {
         self.stop_v2(now);
         self.hand_over_waits = false;
         self.mount.drop_order(now, device, self.condition());
-        self.drain_mount();
+        self.drain_mount(now);
         if let Some(change) = self.mode_change.take()
             && let Some(id) = change.asker()
         {
@@ -296,10 +296,10 @@ impl GremsyDriver {
         if self.search.decided() != Some(Generation::V2) {
             self.mount.advance(now, device, self.condition());
         }
-        self.drain_mount();
+        self.drain_mount(now);
     }
 
-    fn drain_mount(&mut self) {
+    fn drain_mount(&mut self, now: Timestamp) {
         while let Some(output) = self.mount.poll_output() {
             match output {
                 MountOutput::Send(command) => self.send_command(command),
@@ -310,9 +310,15 @@ impl GremsyDriver {
                     }
                     self.outputs.push_back(DriverOutput::Command(Box::new(command)));
                 }
-                MountOutput::ModeRefused => self.raise(Fault::ModeRefused),
-                MountOutput::ModeTaken => self.faults.clear(|fault| *fault == Fault::ModeRefused),
+                MountOutput::ModeRefused => {
+                    self.faults.clear(|fault| *fault == Fault::NoAnswers);
+                    self.raise(Fault::ModeRefused);
+                }
+                MountOutput::ModeTaken => {
+                    self.faults.clear(|fault| matches!(fault, Fault::ModeRefused | Fault::NoAnswers));
+                }
                 MountOutput::StaysRetracted => self.raise_stays_off(),
+                MountOutput::Unanswered => self.raise_unanswered(now),
             }
         }
     }

@@ -223,8 +223,14 @@ impl GremsyDriver {
         if is_v2 && waited >= READY_WITHIN && self.heard.device_status.is_none() {
             self.raise(Fault::NoAttitude);
         }
-        // One that says nothing at all is not there.
-        if self.mount.is_unanswered(now) && now.since(self.heard.latest) < HEARD_EVERY {
+        if self.mount.is_unanswered(now) {
+            self.raise_unanswered(now);
+        }
+    }
+
+    /// It answers nothing; one that says nothing at all is not there.
+    pub(super) fn raise_unanswered(&mut self, now: Timestamp) {
+        if now.since(self.heard.latest) < HEARD_EVERY {
             self.raise(Fault::NoAnswers);
         }
     }

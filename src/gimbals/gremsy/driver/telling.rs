@@ -106,7 +106,10 @@ impl GremsyDriver {
             stopping.handle_report(now, Look { pitch: pose.pitch, yaw: pose.yaw, heading });
         }
         let limits = FailureFlags::AT_PITCH_LIMIT | FailureFlags::AT_YAW_LIMIT | FailureFlags::AT_ROLL_LIMIT;
-        if self.heard.status.is_some_and(|(_, status)| !status.motors_on()) {
+        let motors_off = self.heard.status.is_some_and(|(_, status)| !status.motors_on());
+        // What it does not acknowledge it need not do.
+        let is_unheard = matches!(self.mount.wanted(), Some(Order::Point { .. })) && !self.mount.has_heard();
+        if motors_off || is_unheard {
             return self.effect.pause();
         }
         match self.effect.handle_report(now, pose, status.failures.intersects(limits)) {

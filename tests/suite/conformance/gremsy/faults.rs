@@ -218,9 +218,11 @@ fn a_gimbal_that_does_not_answer_is_named() {
         world.send(places.gimbal, crate::support::world::GIMBAL, &MavMessage::MOUNT_ORIENTATION(orientation));
         run(&mut world, places, Duration::from_millis(100));
     }
-    // FOLLOW was never acknowledged, so no angle was sent: what is told is that it does not take its mode.
-    let told = texts(&world, places);
-    assert!(told.contains(&"camera: refuses lock or follow".to_owned()), "{told:?}");
+    // FOLLOW was never acknowledged, so no angle was sent.
+    assert_eq!(texts(&world, places), ["camera: does not answer commands"]);
+    let named =
+        "its status arrives and its answers do not. Check the wire towards the gimbal and the baud rate (115200)";
+    assert_eq!(faults(&world), [named]);
     let (commands, _) = orders(&mut world, places);
     assert!(commands.iter().all(|command| command.command == command::USER_2), "{commands:?}");
 }

@@ -2,6 +2,9 @@ use super::*;
 use crate::geometry::{Angle, GimbalAngles};
 use crate::gimbals::operation::ResetMode;
 
+const ACCEPTED: CommandOutcome = CommandOutcome::Answered(CommandResult::Accepted as u8);
+const DENIED: CommandOutcome = CommandOutcome::Answered(CommandResult::Denied as u8);
+
 const GIMBAL: MavId = MavId::new(1, 154);
 const READY: Condition = Condition { is_heard: true, is_ready: true, is_there: false, motors_on: true };
 
@@ -55,7 +58,7 @@ fn the_mode_comes_first_and_then_the_newest_angle() {
     }
     assert_eq!(drain(&mut mount), [MountOutput::Command(packet::follow(GIMBAL))]);
 
-    assert!(mount.handle_outcome(at(120), GIMBAL, &packet::follow(GIMBAL), true));
+    assert!(mount.handle_outcome(at(120), GIMBAL, &packet::follow(GIMBAL), ACCEPTED));
     mount.advance(at(120), GIMBAL, READY);
 
     let angles = GimbalAngles { roll: Angle::ZERO, pitch: Angle::from_degrees(-30.0), yaw: Angle::from_degrees(45.0) };
@@ -76,7 +79,7 @@ fn without_its_mode_an_angle_is_not_sent_and_a_stop_is() {
     let mut mount = Mount::default();
     mount.order(at(0), point(-10.0, 45.0, YawMode::Lock));
     mount.advance(at(0), GIMBAL, READY);
-    mount.handle_outcome(at(10), GIMBAL, &packet::lock(GIMBAL), false);
+    mount.handle_outcome(at(10), GIMBAL, &packet::lock(GIMBAL), DENIED);
     mount.advance(at(10), GIMBAL, READY);
     assert_eq!(drain(&mut mount), [MountOutput::Command(packet::lock(GIMBAL)), MountOutput::ModeRefused]);
 
@@ -258,7 +261,7 @@ fn retract_switches_the_motors_off_once_and_the_next_angle_on_again() {
     let mut mount = following();
     let off = stream(&mut mount, 0, 1_000, Order::Retract, READY);
     assert_eq!(off, [(0, MountOutput::Command(packet::set_motors(GIMBAL, false)))]);
-    assert!(mount.handle_outcome(at(1_000), GIMBAL, &packet::set_motors(GIMBAL, false), true));
+    assert!(mount.handle_outcome(at(1_000), GIMBAL, &packet::set_motors(GIMBAL, false), ACCEPTED));
 
     let order = point(-10.0, 0.0, YawMode::Follow);
     let is_off = Condition { motors_on: false, ..READY };
