@@ -297,9 +297,17 @@ impl Roster {
 
     /// A name that no gimbal has: by the component, with the system where that is not the vehicle's.
     fn free_name(&self, device: MavId, ours: u8) -> String {
-        let plain = format!("gimbal-{}", device.component);
-        let is_taken = self.gimbals.iter().any(|gimbal| gimbal.manager.settings().name == plain);
-        if is_taken || device.system != ours { format!("gimbal-{}-{}", device.system, device.component) } else { plain }
+        let full = format!("gimbal-{}-{}", device.system, device.component);
+        let plain = if device.system == ours { format!("gimbal-{}", device.component) } else { full.clone() };
+        self.first_free_name(plain, &full)
+    }
+
+    /// `name`, or a longer one where a gimbal has that: an entry may be called anything.
+    fn first_free_name(&self, name: String, longer: &str) -> String {
+        let is_free = |name: &String| !self.gimbals.iter().any(|gimbal| gimbal.manager.settings().name == *name);
+        let numbered = (2_u32..).map(|number| format!("{longer}-{number}"));
+        let mut names = [name, longer.to_owned()].into_iter().chain(numbered);
+        names.find(is_free).expect("there are more numbers than gimbals")
     }
 
     /// The manager component for a device without an entry.
@@ -315,7 +323,8 @@ impl Roster {
         let first = component::ONBOARD_COMPUTER;
         let chosen = self.gimbals.iter().any(|gimbal| gimbal.manager.settings().manager_component_id.is_some());
         if !self.has_manager(first) && !chosen {
-            let settings = GimbalSettings::found(format!("gimbal-{}", component::GIMBAL));
+            let name = self.first_free_name(format!("gimbal-{}", component::GIMBAL), &format!("gimbal-{first}"));
+            let settings = GimbalSettings::found(name);
             self.gimbals.push(Gimbal::new(settings, &self.rules, first, false, None));
         }
     }
