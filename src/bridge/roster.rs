@@ -145,10 +145,10 @@ pub struct Roster {
     open: ChannelSet,
     /// Devices that are not adopted yet, and when each was first heard.
     waiting: Vec<(MavId, Timestamp)>,
-    /// Components of type gimbal that manage a gimbal without MAVLink.
     /// The device id that is kept for each entry whose family is found out, in case that it is no v2 device: whoever learned
     /// an id goes by it for good, so it does not depend on which of them is found first.
     spoken_for: Vec<Option<u8>>,
+    /// Components of type gimbal that manage a gimbal without MAVLink.
     self_managed: Vec<MavId>,
 }
 

@@ -201,6 +201,13 @@ fn an_old_attitude_is_told_as_a_fault() {
     let told: Vec<GIMBAL_DEVICE_ATTITUDE_STATUS_DATA> = of(&of_device(world.take(places.autopilot)));
     assert_eq!(told.len(), 20);
     assert!(told.iter().all(|status| status.failure_flags == COMMS_ERROR));
+    // So is a fresh one of a gimbal whose line was cut: it is lost at once.
+    introduce(&mut world, places, usual_capabilities());
+    world.forget();
+    world.unplug(places.gimbal);
+    world.run_for(SECOND / 2);
+    let told: Vec<GIMBAL_DEVICE_ATTITUDE_STATUS_DATA> = of(&of_device(world.take(places.autopilot)));
+    assert_eq!(told.iter().map(|status| status.failure_flags).collect::<Vec<_>>(), [COMMS_ERROR; 5]);
 }
 
 /// "ACKs for commands to S/154, SET_MESSAGE_INTERVAL; a full answer set as a real device": each command has one answer, and
@@ -221,6 +228,8 @@ fn it_answers_as_a_device() {
         (set_interval(GIMBAL, 285, -3.0),                      DENIED,      &[]),
         (set_interval(GIMBAL, 281, 50_000.0),                  DENIED,      &[]),
         (command_long(GIMBAL, 510, &[285.0]),                  ACCEPTED,    &[244]),
+        (command_long(GIMBAL, 510, &[0.0]),                    ACCEPTED,    &[244]),
+        (command_long(GIMBAL, 510, &[148.0]),                  DENIED,      &[]),
         (command_long(GIMBAL, 1000, &[-10.0, 0.0, NAN, NAN]),  UNSUPPORTED, &[]),
         (command_long(GIMBAL, 1001, &[-2.0, -2.0, -1.0, -1.0]), UNSUPPORTED, &[]),
         (command_long(GIMBAL, 246, &[0.0, 0.0, 0.0, 1.0]),     DENIED,      &[]),
@@ -234,6 +243,13 @@ fn it_answers_as_a_device() {
         assert_eq!(answers[0].decode::<COMMAND_ACK_DATA>(), ack(AUTOPILOT, number, result), "{command:?}");
         assert!(answers.iter().all(|answer| answer.source() == GIMBAL));
         assert_eq!(world.take(places.gimbal), [], "{command:?}");
+    }
+    // What everybody is told and it does not know is somebody else's business.
+    for target in [EVERYBODY, MavId::new(1, 0)] {
+        for command in [command_long(target, 400, &[1.0]), request_message(target, 148)] {
+            let answers = world.ask(places.autopilot, AUTOPILOT, &command);
+            assert_eq!(of_device(answers), [], "{command:?}");
+        }
     }
     let list = PARAM_REQUEST_LIST_DATA { target_system: 1, target_component: 154 };
     assert_eq!(world.ask(places.autopilot, AUTOPILOT, &MavMessage::PARAM_REQUEST_LIST(list)), []);

@@ -6,6 +6,7 @@ use crate::gimbals::signs::{Sign, Signs};
 use crate::wire::{DatagramFrames, encode_to_vec};
 
 mod being_there;
+mod hearing;
 mod line;
 mod modes;
 

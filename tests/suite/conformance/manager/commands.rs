@@ -329,6 +329,8 @@ fn item_179_at_the_end_the_gimbal_is_stopped_and_goodbye_said() {
         assert_eq!(beats.iter().map(|beat| beat.system_status).collect::<Vec<_>>(), [7]);
     }
     assert!(world.bridge.is_finished());
+    // "Then one POWEROFF heartbeat", however often it is told to end.
+    world.input(Input::Shutdown);
     world.run_for(SECOND / 2);
     let beats: Vec<HEARTBEAT_DATA> = world.take_messages(places.ground);
     assert_eq!(beats, [], "one goodbye");

@@ -6,12 +6,13 @@ use gimbald::wire::ids::CapFlags;
 
 use super::frames::turn_vehicle;
 use super::{
-    COMPANION, FIELD, SECOND, assert_near, fly, is_nan, look, only_setpoint, run_looking, setpoints, with_gimbal,
-    with_gimbal_that,
+    COMPANION, FIELD, SECOND, assert_near, fly, is_nan, look, only_setpoint, run_flying, run_looking, setpoints,
+    with_gimbal, with_gimbal_that,
 };
 use crate::support::script::{
-    ACCEPTED, DENIED, NAN, TEMPORARILY_REJECTED, UNSUPPORTED, ack, again, command_int, command_long, mount_configure,
-    mount_control, of, pitch_yaw_deg, pitchyaw, quaternion, set_attitude, take_control, to, usual_capabilities,
+    ACCEPTED, DENIED, NAN, TEMPORARILY_REJECTED, UNSUPPORTED, ack, again, command_int, command_long, configure,
+    mount_configure, mount_control, of, pitch_yaw_deg, pitchyaw, quaternion, set_attitude, take_control, to,
+    usual_capabilities,
 };
 use crate::support::world::{AUTOPILOT, GCS, GIMBAL, MANAGER, World, three_links};
 
@@ -117,6 +118,18 @@ fn the_inputs_of_a_mount_are_what_their_sender_configured() {
         assert_eq!(world.result_of(places.ground, sender, &control([-20.0, 0.0, 40.0], 2.0)), Some(ACCEPTED));
         let setpoint = only_setpoint(&mut world, places);
         assert_near(pitch_yaw_deg(setpoint.q).1, yaw, 0.001);
+    }
+
+    // "In the order roll, pitch, yaw", by either form: a roll in degrees per second beside a pitch in degrees.
+    for rates in [configure_mount(2.0, [1.0, 0.0, 0.0]), command_int(MANAGER, 204, [2.0, 1.0, 1.0, 1.0], 1, 0, 0.0)] {
+        assert_eq!(world.result_of(places.ground, GCS, &rates), Some(ACCEPTED));
+        assert_eq!(world.result_of(places.ground, GCS, &control([-20.0, 5.0, 40.0], 2.0)), Some(ACCEPTED));
+        let q = only_setpoint(&mut world, places).q;
+        let (pitch, yaw) = pitch_yaw_deg(q);
+        assert_near(pitch, -20.0, 0.001);
+        assert_near(yaw, 40.0, 0.001);
+        let [w, x, y, z] = q.map(f64::from);
+        assert_near((2.0 * (y * z + w * x)).asin().to_degrees(), 0.0, 0.5);
     }
 
     // Pitch and yaw as rates, by either form.
@@ -230,6 +243,14 @@ fn client_item_e127_a_place_for_a_mount_comes_in_either_unit() {
         assert_eq!(world.result_of(places.ground, GCS, &place(0.0, 0.0, 0.0)), Some(ACCEPTED));
         assert_eq!(world.snapshot().gimbals[0].roi, None);
     }
+    // "Always both alike": near Greenwich the longitude alone could be in either unit.
+    let (mut world, places) = with_gimbal();
+    fly(&mut world, places, FIELD, 0.0);
+    assert_eq!(world.result_of(places.ground, GCS, &place(50.0, 474_000_000.0, -320.0)), Some(ACCEPTED));
+    let roi = world.snapshot().gimbals[0].roi.clone().expect("a place");
+    assert_near(roi.latitude_deg, 47.4, 1e-5);
+    assert_near(roi.longitude_deg, -0.000_032, 1e-9);
+
     let (mut world, places) = with_gimbal();
     let mode = configure_mount(4.0, [0.0; 3]);
     assert_eq!(world.result_of(places.ground, GCS, &mode), Some(TEMPORARILY_REJECTED));
@@ -275,6 +296,37 @@ fn mount_commands_pass_the_gate() {
     }
     assert_eq!(setpoints(&mut world, places), []);
     assert_eq!(world.snapshot().gimbals[0].rejected["1/192"]["not_in_control"], commands.len() as u64 + 3);
+}
+
+/// Protocol checklist 66: "Secondary's absolute set-points only if primary silent > 2 s." A place is one, however a mount is
+/// told it.
+#[test]
+fn a_place_for_a_mount_by_the_secondary_waits_for_the_primary_to_be_silent() {
+    let (mut world, places) = with_gimbal();
+    let both = configure([255.0, 190.0], [1.0, 192.0]);
+    assert_eq!(world.result_of(places.ground, GCS, &both), Some(ACCEPTED));
+    fly(&mut world, places, FIELD, 0.0);
+    world.send(places.autopilot, AUTOPILOT, &home_position([473_977_420, 85_455_940, 400_000]));
+    let commands =
+        [place(50.0, 47.4, 8.55), place(0.0, 0.0, 0.0), control([0.0; 3], 6.0), configure_mount(6.0, [0.0; 3])];
+    let messages = [mount_control(MANAGER, [474_000_000, 85_500_000, 5_000]), mount_configure(MANAGER, 6)];
+    assert_eq!(world.result_of(places.autopilot, COMPANION, &configure_mount(4.0, [0.0; 3])), Some(ACCEPTED));
+    assert_eq!(world.result_of(places.ground, GCS, &place(10.0, 47.5, 8.5)), Some(ACCEPTED));
+    let roi = world.snapshot().gimbals[0].roi.clone().expect("the primary's place");
+    for command in &commands {
+        assert_eq!(world.result_of(places.autopilot, COMPANION, command), Some(DENIED), "{command:?}");
+    }
+    for message in &messages {
+        world.send(places.autopilot, COMPANION, message);
+    }
+    let gimbal = world.snapshot().gimbals[0].clone();
+    assert_eq!(gimbal.rejected["1/192"]["primary_is_active"], (commands.len() + messages.len()) as u64);
+    assert_eq!(gimbal.roi, Some(roi));
+
+    run_flying(&mut world, places, SECOND * 21 / 10, FIELD, 0.0);
+    for command in &commands {
+        assert_eq!(world.result_of(places.autopilot, COMPANION, command), Some(ACCEPTED), "{command:?}");
+    }
 }
 
 /// To everybody they are for us too; what the autopilot says to every mount is how it drives one, and what is said to the

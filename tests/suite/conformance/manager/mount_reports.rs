@@ -122,6 +122,45 @@ fn a_yaw_that_is_not_known_from_the_nose_is_left_out() {
     assert!(orientations.iter().all(|told| told.yaw.is_nan() && (told.yaw_absolute - 120.0).abs() < 1e-3));
 }
 
+/// Protocol notes 3.6: "yaw_earth = yaw_vehicle + delta_yaw". A gimbal that tells its yaw from North and where the
+/// nose points is told of from the nose, whether or not the autopilot tells a heading, and by its own where both do.
+#[test]
+fn the_heading_of_the_gimbal_itself_tells_its_yaw_from_the_nose() {
+    for heading_deg in [None, Some(70.0)] {
+        let (mut world, places) = with_v1_status(usual_capabilities());
+        if let Some(heading_deg) = heading_deg {
+            turn_vehicle(&mut world, places, heading_deg);
+        }
+        let status = device_status(world.now, 92, -45.0, 120.0);
+        let delta_yaw = 90.0_f32.to_radians();
+        let status = GIMBAL_DEVICE_ATTITUDE_STATUS_DATA { delta_yaw, delta_yaw_velocity: 0.0, ..status };
+        world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status));
+        world.forget();
+        world.run_for(SECOND / 2);
+        let heard = world.take(places.ground);
+        let yaws: Vec<i32> = of::<MOUNT_STATUS_DATA>(&heard).iter().map(|told| told.pointing_c).collect();
+        assert_eq!(yaws, [3_000, 3_000], "{heading_deg:?}");
+        let orientations: Vec<MOUNT_ORIENTATION_DATA> = of(&heard);
+        assert_eq!(orientations.len(), 5);
+        for told in orientations {
+            assert_near(told.yaw.into(), 30.0, 1e-3);
+            assert_near(told.yaw_absolute.into(), 120.0, 1e-3);
+        }
+    }
+}
+
+/// A gimbal that has no radio control is under none, whatever its flags say.
+#[test]
+fn a_gimbal_without_radio_control_is_never_said_to_be_under_it() {
+    let (mut world, places) = with_v1_status(usual_capabilities());
+    let status = device_status(world.now, 256 | 44, 0.0, 0.0);
+    world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status));
+    world.forget();
+    world.run_for(SECOND / 2);
+    let told = of::<MOUNT_STATUS_DATA>(&world.take(places.ground));
+    assert_eq!(told.iter().map(|told| told.mount_mode).collect::<Vec<_>>(), [2, 2]);
+}
+
 /// `mount_mode` says what the gimbal does.
 #[test]
 fn the_mode_of_a_mount_is_what_the_gimbal_does() {

@@ -7,7 +7,9 @@ use gimbald::wire::dialect::STATUSTEXT_DATA;
 use super::frames::turn_vehicle;
 use super::mount::{configure_mount, control};
 use super::{COMPANION, SECOND, assert_near, look, only_setpoint, setpoints, with_gimbal, with_gimbal_that};
-use crate::support::script::{ACCEPTED, DENIED, command_long, mount_control, of, pitch_yaw_deg, usual_capabilities};
+use crate::support::script::{
+    ACCEPTED, DENIED, NAN, command_long, mount_control, of, pitch_yaw_deg, usual_capabilities,
+};
 use crate::support::world::{GCS, MANAGER, three_links};
 
 /// "ArduPilot refuses |pitch| > 90, |roll| > 180, |yaw| > 360": a number beyond that comes from a sender of centidegrees.
@@ -29,6 +31,36 @@ fn angles_that_look_like_centidegrees_are_denied() {
     assert_eq!((rejected.len(), rejected["looks_like_centidegrees"]), (1, 5));
     assert_eq!(world.result_of(places.ground, GCS, &control([f32::INFINITY, 0.0, 0.0], 2.0)), Some(DENIED));
     assert_eq!(world.snapshot().gimbals[0].rejected["255/190"]["infinite_number"], 1);
+}
+
+/// Only angles have such a range: "p5/p6/p7 … 1 angular rate", and a gimbal may pitch at more than 90 degrees per second.
+#[test]
+fn a_fast_rate_does_not_look_like_centidegrees() {
+    let (mut world, places) = with_gimbal();
+    assert_eq!(world.result_of(places.ground, GCS, &configure_mount(2.0, [1.0; 3])), Some(ACCEPTED));
+    assert_eq!(world.result_of(places.ground, GCS, &control([-120.0, NAN, NAN], 2.0)), Some(ACCEPTED));
+    assert_near(only_setpoint(&mut world, places).angular_velocity_y.into(), (-120.0_f64).to_radians(), 1e-6);
+    world.send(places.ground, GCS, &mount_control(MANAGER, [12_000, 0, 0]));
+    assert_near(only_setpoint(&mut world, places).angular_velocity_y.into(), 120.0_f64.to_radians(), 1e-6);
+    assert_eq!(world.snapshot().gimbals[0].rejected, Default::default());
+}
+
+/// Both of the first numbers are far beyond angles where they are the coordinates of a place; one alone is an angle that no
+/// gimbal has.
+#[test]
+fn one_number_beyond_all_angles_is_no_place() {
+    let (mut world, places) = with_gimbal();
+    for (inputs, reason) in [
+        ([473_977_420, 0, 0], "angle_out_of_range"),
+        ([0, 85_455_940, 0], "angle_out_of_range"),
+        ([473_977_420, 85_455_940, 0], "looks_like_a_place"),
+    ] {
+        let before = world.snapshot().gimbals[0].rejected.get("255/190").and_then(|all| all.get(reason).copied());
+        world.send(places.ground, GCS, &mount_control(MANAGER, inputs));
+        let after = world.snapshot().gimbals[0].rejected["255/190"][reason];
+        assert_eq!(after, before.unwrap_or(0) + 1, "{inputs:?}");
+    }
+    assert_eq!(setpoints(&mut world, places), []);
 }
 
 /// Gimbal statement 38: "205 with p1 = −4500 is … interpreted as −45° with accept_centidegrees." Who was found out once means

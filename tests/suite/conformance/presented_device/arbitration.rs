@@ -6,7 +6,7 @@ use gimbald::bridge::settings::Settings;
 use gimbald::gimbals::settings::{GimbalSettings, Takeover};
 use gimbald::manager::settings::ControlSettings;
 use gimbald::timestamp::Timestamp;
-use gimbald::wire::dialect::{COMMAND_ACK_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA, MavMessage};
+use gimbald::wire::dialect::{COMMAND_ACK_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA, MavMessage, SYSTEM_TIME_DATA};
 use gimbald::wire::ids::CapFlags;
 
 use proptest::prelude::*;
@@ -86,6 +86,15 @@ impl Flight {
         let events = self.world.snapshot().events;
         events.into_iter().rev().map(|event| (event.what, event.count)).collect()
     }
+}
+
+/// The autopilot, 100 m above the sea's 400 m at 47° N, 8° E, has the device look at a place there; the answers.
+fn name_place(flight: &mut Flight, latitude: f64) -> Vec<u8> {
+    let position = global_position(Timestamp::ZERO, [47.0, 8.0, 500.0], 100.0);
+    let roi = command_int(GIMBAL, 195, [0.0; 4], (latitude * 1e7) as i32, 80_000_000, 400.0);
+    flight.world.send(flight.places.autopilot, AUTOPILOT, &position);
+    let answers = flight.world.ask(flight.places.autopilot, AUTOPILOT, &crate::support::script::in_frame(0, roi));
+    of::<COMMAND_ACK_DATA>(&answers).iter().map(|ack| ack.result).collect()
 }
 
 fn station() -> Option<String> {
@@ -239,6 +248,84 @@ fn a_ground_station_takes_control_back_from_a_moving_demand() {
     assert_eq!((flight.told(), flight.holders()), (Some((44, -30, 0)), (autopilot(), station())));
 }
 
+/// Likewise who takes control without saying where to look, and who steers a gimbal that nobody holds.
+#[test]
+fn what_moves_when_somebody_else_is_heard_is_nothing_new() {
+    for (command, holder, expected) in
+        [(take_control(), station(), -40), (pitchyaw(-70.0, 0.0, NAN, NAN, 44.0), None, -70)]
+    {
+        let mut flight = Flight::new(presenting());
+        let mut pitch = -30.0;
+        let sweep = |flight: &mut Flight, pitch: &mut f64| {
+            for _ in 0..50 {
+                *pitch -= 0.2;
+                flight.demand(setpoint(*pitch, 0.0, 0), PERIOD);
+            }
+        };
+        sweep(&mut flight, &mut pitch);
+        assert_eq!((flight.stream(), flight.holders()), ("asks".to_owned(), (None, None)));
+        assert_eq!(flight.command(&command), Some(ACCEPTED));
+        sweep(&mut flight, &mut pitch);
+
+        assert_eq!((flight.stream(), flight.holders()), ("overruled".to_owned(), (holder, None)));
+        assert_eq!(flight.told(), Some((44, expected, 0)));
+        flight.run(3 * SECOND);
+        sweep(&mut flight, &mut pitch);
+        assert_eq!(flight.stream(), "asks", "it has rested");
+    }
+}
+
+/// What creeps is followed by whom it is obeyed already, also where everybody may steer; not by who looks at a place, and not
+/// by who was told something else.
+#[test]
+fn what_creeps_ends_neither_a_place_nor_what_another_asked_for() {
+    let creep = |flight: &mut Flight, pitch: &mut f64| {
+        for _ in 0..100 {
+            *pitch -= 0.005;
+            flight.demand(setpoint(*pitch, 0.0, 0), PERIOD);
+        }
+    };
+    let mut flight = Flight::new(presenting());
+    let mut pitch = -40.0;
+    flight.demand(setpoint(pitch, 0.0, 0), 4 * SECOND);
+    assert_eq!(flight.command(&pitchyaw(-70.0, 0.0, NAN, NAN, 44.0)), Some(ACCEPTED));
+    creep(&mut flight, &mut pitch);
+    assert_eq!((flight.told(), flight.holders()), (Some((44, -70, 0)), (None, None)));
+
+    let mut flight = Flight::new(presenting());
+    let mut pitch = -40.0;
+    flight.demand(setpoint(pitch, 0.0, 0), 4 * SECOND);
+    assert_eq!(name_place(&mut flight, 47.0 + 100.0 / 111_180.0), [ACCEPTED]);
+    creep(&mut flight, &mut pitch);
+    assert!(flight.world.snapshot().gimbals[0].roi.is_some(), "the place is looked at");
+    // A setpoint that asks for something ends it, and the same place is something new after that.
+    flight.demand(setpoint(-10.0, 0.0, 0), SECOND);
+    assert_eq!((flight.told(), flight.world.snapshot().gimbals[0].roi.clone()), (Some((44, -10, 0)), None));
+    assert_eq!(name_place(&mut flight, 47.0 + 100.0 / 111_180.0), [ACCEPTED]);
+    assert!(flight.world.snapshot().gimbals[0].roi.is_some());
+}
+
+/// "What the autopilot had in hand goes back when it starts again": it knows nothing of what it asked for, so the place that
+/// it names again is something new.
+#[test]
+fn after_a_restart_of_the_autopilot_a_place_is_asked_for_anew() {
+    let mut flight = Flight::new(presenting());
+    let restart = |flight: &mut Flight, millis: u32| {
+        let time = SYSTEM_TIME_DATA { time_unix_usec: 0, time_boot_ms: millis };
+        flight.world.send(flight.places.autopilot, AUTOPILOT, &MavMessage::SYSTEM_TIME(time));
+    };
+    restart(&mut flight, 3_600_000);
+    assert_eq!(name_place(&mut flight, 47.001), [ACCEPTED]);
+    flight.run(SECOND);
+    assert_eq!(flight.command(&take_control()), Some(ACCEPTED));
+    assert_eq!(flight.command(&pitchyaw(-10.0, 0.0, NAN, NAN, 44.0)), Some(ACCEPTED));
+    assert_eq!(name_place(&mut flight, 47.001), [DENIED], "it is nothing new");
+    restart(&mut flight, 1_000);
+    flight.run(SECOND / 5);
+    assert_eq!(name_place(&mut flight, 47.001), [ACCEPTED]);
+    assert_eq!(flight.holders(), (autopilot(), station()));
+}
+
 /// "NaN q with rates = rates": they go on while the stream does, "if ArduPilot's stream stops, its rates stop", and so they
 /// do when control goes back.
 #[test]
@@ -299,6 +386,13 @@ fn an_exclusive_holder_is_left_alone() {
     }
     assert_eq!((flight.told(), flight.holders()), (None, (station(), None)));
     assert_eq!(flight.world.snapshot().gimbals[0].rejected["1/1"]["exclusively_held"], 2);
+    // What was denied is denied until something else is asked for, also when the gimbal is free by then.
+    flight.demand(setpoint(-75.0, 0.0, 0), SECOND);
+    assert_eq!(flight.command(&configure([-3.0, -3.0], [-1.0, -1.0])), Some(ACCEPTED));
+    flight.run(2 * SECOND);
+    assert_eq!((flight.told(), flight.holders()), (None, (None, None)));
+    flight.demand(setpoint(-50.0, 0.0, 0), SECOND);
+    assert_eq!(flight.told(), Some((44, -50, 0)));
 }
 
 /// With `unclaimed = "closed"` nobody steers without control: for a demand it is taken, and given up afterwards.

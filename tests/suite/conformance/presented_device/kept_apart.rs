@@ -2,6 +2,7 @@
 
 use gimbald::bridge::Input;
 use gimbald::bridge::settings::{Role, Settings, SystemId, Transport};
+use gimbald::gimbals::settings::GimbalSettings;
 use gimbald::timestamp::Timestamp;
 use gimbald::wire::MavId;
 use gimbald::wire::dialect::{
@@ -184,6 +185,61 @@ fn a_gimbal_behind_the_autopilot_is_not_presented() {
     assert_eq!(world.snapshot().gimbals[0].presented, None);
     world.send(places.autopilot, AUTOPILOT, &setpoint(-30.0, 0.0, 0));
     assert!(world.snapshot().conflicts[0].contains("MNT1_TYPE"));
+}
+
+/// R22: "On a link where the gimbal itself is, and where another has the id of the presented device, nothing is presented".
+#[test]
+fn where_the_gimbal_or_a_namesake_is_nothing_is_presented() {
+    // The gimbal of manager 191, which would be presented as 154, under an id of its own.
+    let device = MavId::new(1, 50);
+    let entry = GimbalSettings { manager_component_id: Some(191), ..GimbalSettings::found("camera".to_owned()) };
+    let (mut world, places) = World::empty(Settings { gimbals: vec![entry], ..presenting() });
+    world.run_for(SECOND / 2);
+    world.send(places.autopilot, AUTOPILOT, &ardupilot_heartbeat());
+    let information = MavMessage::GIMBAL_DEVICE_INFORMATION(device_information(world.now, usual_capabilities()));
+    world.send(places.autopilot, device, &gimbal_heartbeat());
+    world.send(places.autopilot, device, &information);
+    world.forget();
+    world.run_with(3 * SECOND, &[(SECOND, places.autopilot, device, gimbal_heartbeat())]);
+    assert_eq!(of_device(world.take(places.autopilot)), []);
+    assert_eq!(world.snapshot().gimbals[0].device.as_deref(), Some("1/50"));
+    assert_eq!(world.snapshot().gimbals[0].presented, None);
+
+    // Another device at the autopilot's end under the id that ours would have there.
+    let (mut world, places) = with_device(presenting());
+    let beats = [
+        (SECOND, places.autopilot, GIMBAL, gimbal_heartbeat()),
+        (SECOND / 2, places.gimbal, GIMBAL, gimbal_heartbeat()),
+    ];
+    world.run_with(SECOND, &beats);
+    world.forget();
+    world.run_with(3 * SECOND, &beats);
+    assert!(!ids(&world.take(places.autopilot)).contains(&285), "the device would tell it ten times a second");
+    assert_eq!(world.snapshot().gimbals[0].presented, None);
+}
+
+/// "The real 154 … is not forwarded to the autopilot's link", under whatever id it is: there it is the one that we present.
+#[test]
+fn a_gimbal_under_another_id_than_it_is_presented_with_is_not_seen_either() {
+    let device = MavId::new(1, 50);
+    let entry = GimbalSettings { manager_component_id: Some(191), ..GimbalSettings::found("camera".to_owned()) };
+    let (mut world, places) = World::empty(Settings { gimbals: vec![entry], ..presenting() });
+    world.run_for(SECOND / 2);
+    world.send(places.autopilot, AUTOPILOT, &ardupilot_heartbeat());
+    world.send(places.gimbal, device, &gimbal_heartbeat());
+    world.forget();
+    for message in [
+        gimbal_heartbeat(),
+        MavMessage::GIMBAL_DEVICE_INFORMATION(device_information(world.now, usual_capabilities())),
+        MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(device_status(world.now, 44, -5.0, 10.0)),
+    ] {
+        world.send(places.gimbal, device, &message);
+    }
+    world.run_for(SECOND);
+    let (seen, on_ground) = (world.take(places.autopilot), world.take(places.ground));
+    assert!(seen.iter().all(|arrival| arrival.source() != device));
+    assert!(!of_device(seen).is_empty(), "it is presented there");
+    assert_eq!(on_ground.iter().filter(|arrival| arrival.source() == device).count(), 3);
 }
 
 /// Two links to one autopilot, which routes between them: what the presented device says comes back, and is no other device.
