@@ -192,7 +192,7 @@ pub const ACTIONS: &[Action] = &[
             operation(Operation::SetStreamRate { stream, rate })
         },
     },
-    plain("parameters/refresh", "refresh-parameters", "Read every parameter of the gimbal again", |_| {
+    plain("parameters/refresh", "refresh-parameters", "Read every parameter of the gimbal", |_| {
         operation(Operation::RefreshParameters)
     }),
     Action {

@@ -135,6 +135,8 @@ async fn show(target: &Target, of_gimbal: &str, json: bool) -> Result<String, Gi
     Ok(text::gimbal_report(&gimbal))
 }
 
+const NONE_WAS_READ: &str = "none was read; refresh-parameters reads them\n";
+
 async fn parameters(target: &Target, of_gimbal: &str, name: Option<&str>, json: bool) -> Result<String, GimbalError> {
     let one = name.map(|name| format!("/{}", percent_encoded(name))).unwrap_or_default();
     let answer = target.get(&format!("{of_gimbal}/parameters{one}")).await?;
@@ -146,7 +148,7 @@ async fn parameters(target: &Target, of_gimbal: &str, name: Option<&str>, json: 
         (Some(_), Value::Object(parameter)) => {
             Ok(format!("{}\n", number(parameter.get("value").unwrap_or(&Value::Null))))
         }
-        (None, Value::Object(all)) if all.is_empty() => Ok("none was read\n".to_owned()),
+        (None, Value::Object(all)) if all.is_empty() => Ok(NONE_WAS_READ.to_owned()),
         (None, Value::Object(all)) => {
             Ok(all.iter().map(|(name, value)| format!("{name:<16} {}\n", number(value))).collect())
         }

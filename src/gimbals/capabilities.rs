@@ -10,7 +10,7 @@ pub struct Capabilities {
     pub limits: Limits,
     /// It turns at a rate by itself; otherwise its angles are turned for it.
     pub turns: bool,
-    /// It has functions beyond where it looks ([`Operation`](super::operation::Operation)).
+    /// Its maker's commands for motors, modes and a restart are for it.
     pub operates: bool,
 }
 

@@ -17,6 +17,7 @@ use super::families;
 use super::gremsy;
 use super::mavlink_v2::{MavlinkV2Driver, packet};
 use super::operation::{Operation, OperationId};
+use super::parameters::Parameters;
 use super::report::Report;
 use super::setpoint::{Setpoint, Turning};
 use super::settings::{Family, GimbalSettings};
@@ -117,6 +118,7 @@ impl Detection {
         }
         self.stop_judging();
         self.take_leave(now);
+        let parameters = self.in_use().hand_over_parameters();
         // A Gremsy may be either, and says which.
         if family != Family::Gremsy {
             self.outputs.push_back(DriverOutput::Report(Report::SpeaksForItself(family == Family::MavlinkV2)));
@@ -131,8 +133,22 @@ impl Detection {
             other.adopt(now, device);
             self.other = Some(other);
         }
+        if let Some(parameters) = parameters {
+            self.hand_over(parameters);
+        }
         if family == Family::MavlinkV1 {
             self.timers.set(Timer::AskParameters, now + ASK_PARAMETERS_AGAIN_EVERY);
+        }
+    }
+
+    /// The driver that comes into use goes on with what another has read and was asked for; a Gremsy's reads by names of its
+    /// own.
+    fn hand_over(&mut self, mut parameters: Parameters) {
+        if self.family() == Family::Gremsy {
+            parameters.forget();
+            parameters.drain_into(&mut self.outputs);
+        } else {
+            self.in_use().take_over_parameters(parameters);
         }
     }
 

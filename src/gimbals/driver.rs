@@ -2,6 +2,7 @@
 
 use super::details::GimbalDetails;
 use super::operation::{Operation, OperationId, OperationResult};
+use super::parameters::Parameters;
 use super::report::Report;
 use super::setpoint::Setpoint;
 use super::settings::Family;
@@ -56,6 +57,15 @@ pub trait GimbalDriver: std::fmt::Debug {
 
     /// An earlier run left it turning, and knew that `family`'s words stop it.
     fn stop_as(&mut self, _family: Family) {}
+
+    /// Gives its parameters away, with what is under way, to another driver of the same gimbal; `None` where the family has a
+    /// list of its own.
+    fn hand_over_parameters(&mut self) -> Option<Parameters> {
+        None
+    }
+
+    /// Goes on with the parameters of the driver before it, where its family has no list of its own.
+    fn take_over_parameters(&mut self, _parameters: Parameters) {}
 
     fn poll_output(&mut self) -> Option<DriverOutput>;
 

@@ -98,6 +98,13 @@ enum Timer {
     Change,
 }
 
+/// Those [of any gimbal](Parameters::of_any_gimbal).
+impl Default for Parameters {
+    fn default() -> Self {
+        Self::of_any_gimbal()
+    }
+}
+
 impl Parameters {
     /// Of a gimbal whose maker tells their names and how they travel.
     pub fn new(encoding: Encoding, catalogue: Catalogue) -> Self {
@@ -271,6 +278,13 @@ impl Parameters {
         }
         self.phase = Phase::Idle;
         self.timers = TimerTable::default();
+    }
+
+    /// The device was restarted: what is known is of before, and what was asked for is not done.
+    pub fn handle_restart(&mut self) {
+        let device = self.device;
+        self.forget();
+        self.device = device;
     }
 
     /// Everything that exists was read; more may still come.

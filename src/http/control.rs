@@ -135,7 +135,7 @@ pub async fn act(
     };
     let answer = window.controls.ask(gimbal.clone(), asked).await;
     if let (Some(parameter), Some(Err(NotDone::Operation(OperationError::NoAnswer)))) = (&parameter, &answer)
-        // One that it has would have been read, as all the others were.
+        // One that it has would have been read, as all the others were or by its name.
         && is_unread(&window.snapshots, &gimbal, parameter).await
     {
         return not_read(parameter).into_response();

@@ -4,6 +4,7 @@ mod autopilot_state;
 mod codec;
 mod detection;
 mod discovery;
+mod gimbal_parameters;
 mod gimbals;
 mod gremsy;
 mod gremsy_by_name;

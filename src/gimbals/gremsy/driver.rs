@@ -332,7 +332,10 @@ impl GimbalDriver for GremsyDriver {
             }
             _ => {}
         }
-        self.v2.handle_received(now, frame);
+        // Parameters are read here, by the maker's names.
+        if frame.message_id() != message::PARAM_VALUE {
+            self.v2.handle_received(now, frame);
+        }
         self.go_on(now);
     }
 

@@ -21,6 +21,7 @@ use crate::gimbals::details::GimbalDetails;
 use crate::gimbals::driver::{CommandOutcome, DriverOutput, GimbalDriver};
 use crate::gimbals::gremsy;
 use crate::gimbals::operation::{Operation, OperationError, OperationId};
+use crate::gimbals::parameters::Parameters;
 use crate::gimbals::report::{GimbalAttitude, GimbalStatus, Identity, Report};
 use crate::gimbals::setpoint::{Pointing, RadioControl, Setpoint};
 use crate::gimbals::settings::Family;
@@ -69,6 +70,8 @@ pub struct MavlinkV1Driver {
     obedience: Obedience,
     does_not_move: DoesNotMove,
     assumed: AssumedPose,
+    /// Read when somebody asks for that, and learned from what it tells others.
+    parameters: Parameters,
     timers: TimerTable<Timer>,
     outputs: VecDeque<DriverOutput>,
 }
@@ -123,6 +126,7 @@ impl MavlinkV1Driver {
             obedience: Obedience::default(),
             does_not_move: DoesNotMove::default(),
             assumed: AssumedPose::default(),
+            parameters: Parameters::of_any_gimbal(),
             timers: TimerTable::default(),
             outputs: VecDeque::new(),
         }
@@ -134,6 +138,7 @@ impl MavlinkV1Driver {
             return;
         }
         self.alive = true;
+        self.parameters.listen(device);
         self.report(Report::Alive { device });
         self.report(Report::Known(self.identity(), capabilities(&self.settings)));
         self.feedback = Feedback::Awaited;
@@ -176,6 +181,7 @@ impl MavlinkV1Driver {
         self.obedience.forget();
         self.does_not_move.is_so = false;
         self.timers.cancel(Timer::Send);
+        self.parameters.handle_restart();
         self.report(Report::Restarted);
     }
 
@@ -301,6 +307,7 @@ impl MavlinkV1Driver {
         for timer in [Timer::Lost, Timer::Send, Timer::FeedbackMissing, Timer::OpenLoop] {
             self.timers.cancel(timer);
         }
+        self.parameters.forget();
         self.report(Report::Lost);
     }
 }
@@ -325,6 +332,7 @@ impl GimbalDriver for MavlinkV1Driver {
             }
             message::PARAM_VALUE | message::GIMBAL_DEVICE_INFORMATION => {
                 self.says_gremsy |= gremsy::is_known_by(frame);
+                self.parameters.handle_received(now, frame);
             }
             message::HEARTBEAT => {
                 let Some(heartbeat) = frame.decode::<HEARTBEAT_DATA>() else { return };
@@ -353,6 +361,7 @@ impl GimbalDriver for MavlinkV1Driver {
         if self.alive {
             self.lose();
         }
+        self.parameters.drain_into(&mut self.outputs);
     }
 
     fn handle_setpoint(&mut self, now: Timestamp, setpoint: Setpoint) {
@@ -388,9 +397,17 @@ impl GimbalDriver for MavlinkV1Driver {
         self.send_when_due(now);
     }
 
-    /// It is handed to its radio control as by a demand; nothing else has a message.
+    /// Its parameters are read and set, and it is handed to its radio control as by a demand; nothing else has a message.
     fn handle_operation(&mut self, now: Timestamp, id: OperationId, operation: Operation) {
         let result = match operation {
+            Operation::RefreshParameters => {
+                self.parameters.refresh_for(now, id);
+                return self.parameters.drain_into(&mut self.outputs);
+            }
+            Operation::SetParameter { name, value } => {
+                self.parameters.set(now, id, &[(&name, value)]);
+                return self.parameters.drain_into(&mut self.outputs);
+            }
             Operation::RadioControl if self.settings.radio_control != V1RadioControl::None => {
                 self.wanted = Some(MountControl::RadioControl);
                 self.send_when_due(now);
@@ -417,6 +434,16 @@ impl GimbalDriver for MavlinkV1Driver {
                 Timer::OpenLoop => self.report_assumed(now),
             }
         }
+        self.parameters.handle_timeout(now);
+        self.parameters.drain_into(&mut self.outputs);
+    }
+
+    fn hand_over_parameters(&mut self) -> Option<Parameters> {
+        Some(std::mem::take(&mut self.parameters))
+    }
+
+    fn take_over_parameters(&mut self, parameters: Parameters) {
+        self.parameters = parameters;
     }
 
     fn poll_output(&mut self) -> Option<DriverOutput> {
@@ -424,14 +451,15 @@ impl GimbalDriver for MavlinkV1Driver {
     }
 
     fn poll_timeout(&self) -> Option<Timestamp> {
-        self.timers.next().map(|(at, _)| at)
+        let timer = self.timers.next().map(|(at, _)| at);
+        [timer, self.parameters.poll_timeout()].into_iter().flatten().min()
     }
 
     fn details(&self, _now: Timestamp) -> GimbalDetails {
         let wrong_family = self.says_gremsy.then(|| gremsy::wrong_family(Family::MavlinkV1));
         let does_not_move = self.does_not_move.is_so.then(|| DOES_NOT_MOVE_AND_WHAT_TO_DO.to_owned());
         let faults = wrong_family.into_iter().chain(does_not_move).collect();
-        GimbalDetails { faults, ..GimbalDetails::default() }
+        GimbalDetails { faults, parameters: self.parameters.by_name(), ..GimbalDetails::default() }
     }
 }
 

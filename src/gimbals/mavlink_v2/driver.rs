@@ -13,6 +13,7 @@ use crate::gimbals::details::GimbalDetails;
 use crate::gimbals::driver::{CommandOutcome, DriverOutput, GimbalDriver};
 use crate::gimbals::gremsy;
 use crate::gimbals::operation::{Operation, OperationError, OperationId};
+use crate::gimbals::parameters::Parameters;
 use crate::gimbals::report::{GimbalStatus, Identity, Report};
 use crate::gimbals::setpoint::Setpoint;
 use crate::gimbals::settings::Family;
@@ -76,6 +77,8 @@ pub struct MavlinkV2Driver {
     sets_frame_bits: bool,
     /// Its `delta_yaw` was not zero once, so it does fill it in.
     fills_delta_yaw: bool,
+    /// Read when somebody asks for that, and learned from what it tells others.
+    parameters: Parameters,
     timers: TimerTable<Timer>,
     outputs: VecDeque<DriverOutput>,
 }
@@ -103,6 +106,7 @@ impl MavlinkV2Driver {
             return;
         }
         self.alive = true;
+        self.parameters.listen(device);
         self.outputs.push_back(DriverOutput::Report(Report::Alive { device }));
         self.timers.set(Timer::CheckRate, now + RATE_WINDOW);
         self.statuses_in_window = 0;
@@ -122,6 +126,7 @@ impl MavlinkV2Driver {
         if self.clock.handle_time(boot_ms) {
             self.fills_delta_yaw = false;
             self.rate_requests_left = RATE_REQUESTS;
+            self.parameters.handle_restart();
             self.outputs.push_back(DriverOutput::Report(Report::Restarted));
             self.ask_anew(now);
             // Two devices under one id seem to be restarted with every word they say.
@@ -236,6 +241,7 @@ impl MavlinkV2Driver {
     fn lose(&mut self) {
         self.alive = false;
         self.clock.forget();
+        self.parameters.forget();
         for timer in [Timer::AskInformation, Timer::UseWithoutInformation, Timer::CheckRate] {
             self.timers.cancel(timer);
         }
@@ -266,6 +272,7 @@ impl GimbalDriver for MavlinkV2Driver {
                 self.handle_heard(now, frame.source());
                 self.handle_status(now, frame);
             }
+            message::PARAM_VALUE => self.parameters.handle_received(now, frame),
             _ => {}
         }
         self.handle_timeout(now);
@@ -276,6 +283,7 @@ impl GimbalDriver for MavlinkV2Driver {
         if self.alive {
             self.lose();
         }
+        self.parameters.drain_into(&mut self.outputs);
     }
 
     fn handle_setpoint(&mut self, _now: Timestamp, setpoint: Setpoint) {
@@ -296,8 +304,13 @@ impl GimbalDriver for MavlinkV2Driver {
         }
     }
 
-    fn handle_operation(&mut self, _now: Timestamp, id: OperationId, _operation: Operation) {
-        self.outputs.push_back(DriverOutput::Operated { id, result: Err(OperationError::Unsupported) });
+    fn handle_operation(&mut self, now: Timestamp, id: OperationId, operation: Operation) {
+        match operation {
+            Operation::RefreshParameters => self.parameters.refresh_for(now, id),
+            Operation::SetParameter { name, value } => self.parameters.set(now, id, &[(&name, value)]),
+            _ => self.outputs.push_back(DriverOutput::Operated { id, result: Err(OperationError::Unsupported) }),
+        }
+        self.parameters.drain_into(&mut self.outputs);
     }
 
     fn handle_timeout(&mut self, now: Timestamp) {
@@ -312,6 +325,16 @@ impl GimbalDriver for MavlinkV2Driver {
                 Timer::CheckRate => self.check_rate(now),
             }
         }
+        self.parameters.handle_timeout(now);
+        self.parameters.drain_into(&mut self.outputs);
+    }
+
+    fn hand_over_parameters(&mut self) -> Option<Parameters> {
+        Some(std::mem::take(&mut self.parameters))
+    }
+
+    fn take_over_parameters(&mut self, parameters: Parameters) {
+        self.parameters = parameters;
     }
 
     fn poll_output(&mut self) -> Option<DriverOutput> {
@@ -319,13 +342,18 @@ impl GimbalDriver for MavlinkV2Driver {
     }
 
     fn poll_timeout(&self) -> Option<Timestamp> {
-        self.timers.next().map(|(at, _)| at)
+        let timer = self.timers.next().map(|(at, _)| at);
+        [timer, self.parameters.poll_timeout()].into_iter().flatten().min()
     }
 
     fn details(&self, _now: Timestamp) -> GimbalDetails {
         let gremsy = self.says_gremsy.then(|| gremsy::wrong_family(Family::MavlinkV2));
         let is_silent = self.alive && !self.known && self.requests >= SILENT_AFTER_REQUESTS;
         let silent = is_silent.then(|| SAYS_NOTHING_OF_ITSELF.to_owned());
-        GimbalDetails { faults: gremsy.into_iter().chain(silent).collect(), ..GimbalDetails::default() }
+        GimbalDetails {
+            faults: gremsy.into_iter().chain(silent).collect(),
+            parameters: self.parameters.by_name(),
+            ..GimbalDetails::default()
+        }
     }
 }

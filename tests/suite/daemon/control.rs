@@ -105,7 +105,23 @@ fn a_gimbal_is_controlled_from_the_command_line() {
     assert_eq!(shown.code, Some(0), "{}", shown.errors);
     assert!(shown.output.starts_with(&format!("gimbal {CAMERA}  alive  mavlink_v2")), "{}", shown.output);
     assert!(shown.output.contains("control   http for"), "{}", shown.output);
-    assert_eq!(flight.run(&format!("{CAMERA} parameters")).output, "none was read\n");
+    let none = "none was read; refresh-parameters reads them\n";
+    assert_eq!(flight.run(&format!("{CAMERA} parameters")).output, none);
+    flight.done("refresh-parameters");
+    let parameters = "SIM_COMP_ID      154\nSIM_RATE_MAX     100\nSIM_TILT_MAX     30\nSIM_TILT_MIN     -90\n";
+    assert_eq!(flight.run(&format!("{CAMERA} parameters")).output, parameters);
+    flight.done("set-parameter SIM_TILT_MAX 25");
+    assert_eq!(flight.run(&format!("{CAMERA} parameters SIM_TILT_MAX")).output, "25\n");
+    flight.refused(
+        &format!("{CAMERA} set-parameter NIX 1 --token-file token"),
+        64,
+        "404 Not Found: no parameter \"NIX\" was read from the gimbal",
+    );
+    flight.refused(
+        &format!("{CAMERA} set-parameter SIM_COMP_ID 0.5 --token-file token"),
+        64,
+        "422 Unprocessable Entity: 0.5 is no whole number from -2147483648 to 2147483647",
+    );
     let json = flight.order("neutral --json").output;
     assert_eq!(json, format!("{{\"gimbal\":\"{CAMERA}\",\"done\":\"neutral\"}}\n"));
     flight.done("control release");

@@ -14,7 +14,7 @@ use gimbald::manager::request::{AxisDemand, Refusal};
 use gimbald::manager::roi::Datum;
 use gimbald::manager::settings::ControlSettings;
 use gimbald::wire::MavId;
-use gimbald::wire::dialect::MavMessage;
+use gimbald::wire::dialect::{MavMessage, PARAM_REQUEST_LIST_DATA};
 
 use super::{
     FIELD, SECOND, fly, look, only_setpoint, run_flying, run_looking, setpoints, told_control, with_gimbal,
@@ -159,9 +159,12 @@ fn who_is_not_in_control_is_refused_and_counted() {
     assert!(setpoints(&mut world, places).is_empty());
 
     // What moves nothing needs no control.
-    for operation in [Operation::RequestInformation, Operation::RefreshParameters] {
-        assert_eq!(ask(&mut world, &Asked::Operation(operation)), Err(NotDone::Operation(OperationError::Unsupported)));
-    }
+    let information = Asked::Operation(Operation::RequestInformation);
+    assert_eq!(ask(&mut world, &information), Err(NotDone::Operation(OperationError::Unsupported)));
+    let refresh = Asked::Operation(Operation::RefreshParameters);
+    world.input(Input::Asked { id: OperationId(7), gimbal: NAME, asked: &refresh });
+    let lists: Vec<PARAM_REQUEST_LIST_DATA> = world.take_messages(places.gimbal);
+    assert_eq!(lists.len(), 1, "it is asked for them");
 }
 
 /// D3: "`unclaimed = \"open\"`: accept setpoints and commands from anyone … `\"closed\"` is the text of the protocol".
@@ -378,7 +381,7 @@ fn settings_do_not_keep_the_rotation_of_a_silent_sender_alive() {
     for second in 0..12 {
         let mode = world.snapshot().gimbals[0].setpoint.as_ref().expect("it was told").mode.clone();
         assert_eq!(mode == "rate", second < 10, "{mode} after {second} s");
-        let set = Asked::Operation(Operation::SetParameter { name: "GYRO_LPF".to_owned(), value: 6.0 });
+        let set = Asked::Operation(Operation::SetCombinedAttitude(true));
         assert_eq!(ask(&mut world, &set), Err(NotDone::Operation(OperationError::Unsupported)));
         let status = device_status(world.now, 44, 0.0, 0.0);
         let status = MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status);
