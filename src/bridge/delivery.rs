@@ -29,7 +29,10 @@ impl Bridge {
         };
         let ours = self.is_own_id(source);
         // R13: what we sent ourselves and came back is dropped; what another sends under our name is forwarded.
-        if (ours || self.is_presented(source)) && self.channels.was_sent(frame.bytes()) {
+        // A gimbal may say the same as the device that we present under its id, and is where none of our frames come back from.
+        let is_at_home = role == Role::Gimbal || self.roster.channel_of(source) == Some(from);
+        let may_come_back = ours || self.is_presented(source) && !is_at_home;
+        if may_come_back && self.channels.was_sent(frame.bytes()) {
             self.count_dropped(link, "loop");
             return;
         }

@@ -6,7 +6,6 @@
 
 use std::time::Duration;
 
-use super::roster::manager_of_device;
 use crate::channel::{ChannelId, ChannelSet};
 use crate::geometry::Angle;
 use crate::gimbals::capabilities::Capabilities;
@@ -115,26 +114,28 @@ fn capabilities(device: CapFlags) -> CapFlags {
         .union(device.intersection(CapFlags::CAN_POINT_LOCATION_LOCAL))
 }
 
-/// The component id under which the gimbal of a manager is presented: 154 for 191, 171 for 192 and so on, and for managers
-/// with other ids the first that is free. `taken` are those of gimbals that are presented already.
+/// The component id under which the gimbal of a manager is presented: the place of its own among `managers` says which, or
+/// the first that is free. `taken` are those of gimbals that are presented already.
 pub fn component_of(manager: u8, managers: &[u8], taken: &[u8]) -> Option<u8> {
-    let is_of = |component: u8, manager: u8| manager_of_device(component) == Some(manager);
-    let is_wanted = |component: &u8| managers.iter().any(|manager| is_of(*component, *manager));
-    let mut free = COMPONENTS.into_iter().filter(|component| !taken.contains(component));
-    free.clone().find(|component| is_of(*component, manager)).or_else(|| free.find(|component| !is_wanted(component)))
+    let place = managers.iter().filter(|other| **other < manager).count();
+    let own = COMPONENTS.get(place).copied();
+    own.into_iter().chain(COMPONENTS).find(|component| !taken.contains(component))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// "The gimbal of manager 191 as 154, the second as 171", whose mounts ArduPilot looks for under these ids.
+    /// "The gimbal of manager 191 as 154, the second as 171", whose mounts ArduPilot looks for under these ids, and the first
+    /// for no other than 154.
     #[test]
     fn each_manager_has_its_device() {
         for (managers, expected) in [
             (vec![191, 192, 193, 194], vec![154, 171, 172, 173]),
             (vec![192, 191], vec![171, 154]),
             (vec![195], vec![154]),
+            (vec![192], vec![154]),
+            (vec![191, 194], vec![154, 171]),
             (vec![195, 191, 196], vec![171, 154, 172]),
             (vec![191, 192, 193, 194, 195, 196], vec![154, 171, 172, 173, 174, 175]),
         ] {

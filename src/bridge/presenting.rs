@@ -9,7 +9,7 @@ use super::Bridge;
 use super::conflicts::{Conflict, Outcome};
 use super::heartbeat;
 use super::presented_device::{PresentedDevice, component_of};
-use super::roster::Place;
+use super::roster::{Gimbal, Place};
 use super::settings::Role;
 use super::snapshot::PresentedSnapshot;
 use super::{LinkIndex, picture, surroundings};
@@ -53,17 +53,23 @@ impl Bridge {
         if !self.presented.is_on {
             return;
         }
-        let managers: Vec<u8> = self.roster.iter().map(|gimbal| gimbal.component).collect();
-        for at in 0..self.roster.len() {
-            let gimbal = self.roster.get_mut(at);
-            let (manager, is_wanted) =
-                (gimbal.component, gimbal.beats() || gimbal.configured || gimbal.adopted.is_some());
-            if !is_wanted || self.presented.devices.iter().any(|device| device.manager == manager) {
+        let is_there = |gimbal: &Gimbal| gimbal.configured || gimbal.adopted.is_some();
+        // 191 answers also where it has no gimbal; ArduPilot looks for one that is there under the first id.
+        let are_some = self.roster.iter().any(is_there);
+        let wanted = |gimbal: &&Gimbal| if are_some { is_there(gimbal) } else { gimbal.beats() };
+        let managers: Vec<u8> = self.roster.iter().filter(wanted).map(|gimbal| gimbal.component).collect();
+        for manager in &managers {
+            if self.presented.devices.iter().any(|device| device.manager == *manager) {
+                continue;
+            }
+            let without_gimbal = self.presented.devices.iter_mut().find(|device| !managers.contains(&device.manager));
+            if let Some(device) = without_gimbal {
+                device.manager = *manager;
                 continue;
             }
             let taken: Vec<u8> = self.presented.devices.iter().map(|device| device.component).collect();
-            let Some(component) = component_of(manager, &managers, &taken) else { continue };
-            let mut device = PresentedDevice::new(manager, component);
+            let Some(component) = component_of(*manager, &managers, &taken) else { continue };
+            let mut device = PresentedDevice::new(*manager, component);
             for channel in self.channels.with_role(Role::Autopilot) {
                 device.open_channel(now, channel);
             }

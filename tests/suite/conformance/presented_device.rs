@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use gimbald::bridge::settings::Settings;
 use gimbald::bridge::snapshot::PresentedSnapshot;
+use gimbald::gimbals::settings::GimbalSettings;
 use gimbald::wire::MavId;
 use gimbald::wire::dialect::{
     COMMAND_ACK_DATA, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA,
@@ -273,6 +274,32 @@ fn its_attitude_comes_as_often_as_it_is_asked_for() {
     let answers = world.ask(places.autopilot, AUTOPILOT, &command_long(GIMBAL, 510, &[285.0]));
     let interval: Vec<MESSAGE_INTERVAL_DATA> = of(&answers);
     assert_eq!(interval, [MESSAGE_INTERVAL_DATA { interval_us: 100_000, message_id: 285 }]);
+}
+
+/// "with ArduPilot configured `MNT1_TYPE` = 6": its first mount looks for 154 and no other, so the gimbal that is there is that
+/// one, whatever its own id, with an entry or without.
+#[test]
+fn a_gimbal_alone_is_what_the_first_mount_looks_for() {
+    let alone = MavId::new(1, 171);
+    let entry = GimbalSettings { component_id: Some(171), ..GimbalSettings::found("camera".to_owned()) };
+    for gimbals in [vec![], vec![entry]] {
+        let (mut world, places) = World::empty(Settings { gimbals, ..presenting() });
+        let beats = [(SECOND, places.autopilot, AUTOPILOT, ardupilot_heartbeat())];
+        world.run_with(3 * SECOND, &beats);
+        let sources: Vec<_> = of_device(world.take(places.autopilot)).iter().map(Arrival::source).collect();
+        assert_eq!(sources, [GIMBAL; 4], "it is there before the gimbal");
+        world.send(places.gimbal, alone, &gimbal_heartbeat());
+        let information = device_information(world.now, usual_capabilities());
+        world.send(places.gimbal, alone, &MavMessage::GIMBAL_DEVICE_INFORMATION(information));
+        world.run_with(2 * SECOND, &beats);
+        let presented = world
+            .snapshot()
+            .gimbals
+            .into_iter()
+            .filter_map(|gimbal| Some((gimbal.manager_component_id, gimbal.presented?.device)));
+        assert_eq!(presented.collect::<Vec<_>>(), [(192, "1/154".to_owned())]);
+        assert_eq!(world.ask(places.autopilot, AUTOPILOT, &request_message(GIMBAL, 283)).len(), 2, "ACK and 283");
+    }
 }
 
 /// "The gimbal of manager 191 as 154, the second as 171, since ArduPilot's instance 2 wants 171."

@@ -38,6 +38,21 @@ fn the_real_gimbal_is_not_seen_by_the_autopilot() {
     assert_eq!(dropped.get("presented_instead"), Some(&7), "{dropped:?}");
 }
 
+/// "only frames identical to ones that we sent are dropped" (D20) are about what comes back: the gimbal itself may say on its
+/// own link, to the byte, what we say under its id to the autopilot.
+#[test]
+fn a_gimbal_that_says_the_same_as_the_presented_device_is_heard() {
+    let (mut world, places) = with_device(presenting());
+    world.run_for(SECOND);
+    let said = of_device(world.take(places.autopilot)).pop().expect("it beats").bytes;
+    world.forget();
+    world.send_bytes(places.gimbal, &said);
+    assert_eq!(of_device(world.take(places.ground)).len(), 1);
+    assert_eq!(world.snapshot().links[1].dropped.get("loop"), None);
+    world.send_bytes(places.ground, &said);
+    assert_eq!(world.snapshot().links[2].dropped.get("loop"), Some(&1));
+}
+
 /// Nor does the manager speak there for a gimbal that is no v2 device: who asks everybody for 283, as PX4 does, hears of one
 /// device. A ground station that asks everybody elsewhere hears of the gimbal.
 #[test]
