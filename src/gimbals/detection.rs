@@ -16,7 +16,7 @@ use super::driver::{CommandOutcome, DriverOutput, GimbalDriver};
 use super::families;
 use super::gremsy;
 use super::mavlink_v2::{MavlinkV2Driver, packet};
-use super::operation::{Operation, OperationId};
+use super::operation::{Operation, OperationError, OperationId};
 use super::parameters::Parameters;
 use super::report::Report;
 use super::setpoint::{Setpoint, Turning};
@@ -119,6 +119,7 @@ impl Detection {
         self.stop_judging();
         self.take_leave(now);
         let parameters = self.in_use().hand_over_parameters();
+        self.end_operations();
         // A Gremsy may be either, and says which.
         if family != Family::Gremsy {
             self.outputs.push_back(DriverOutput::Report(Report::SpeaksForItself(family == Family::MavlinkV2)));
@@ -141,11 +142,22 @@ impl Detection {
         }
     }
 
+    /// What was asked of a driver that is given up, and is not done, is not done any more.
+    fn end_operations(&mut self) {
+        let Some(other) = &mut self.other else { return };
+        other.handle_link_lost();
+        while let Some(output) = other.poll_output() {
+            if let DriverOutput::Operated { .. } = output {
+                self.outputs.push_back(output);
+            }
+        }
+    }
+
     /// The driver that comes into use goes on with what another has read and was asked for; a Gremsy's reads by names of its
-    /// own.
+    /// own, and begins by that.
     fn hand_over(&mut self, mut parameters: Parameters) {
         if self.family() == Family::Gremsy {
-            parameters.forget();
+            parameters.abandon(&OperationError::NotReady);
             parameters.drain_into(&mut self.outputs);
         } else {
             self.in_use().take_over_parameters(parameters);

@@ -267,8 +267,13 @@ impl Parameters {
 
     /// The device is gone, or another one: nothing is known any more, and what was asked for is not done.
     pub fn forget(&mut self) {
+        self.abandon(&OperationError::NotThere);
+    }
+
+    /// The same for this reason.
+    pub fn abandon(&mut self, reason: &OperationError) {
         for id in self.changes.clear().into_iter().chain(std::mem::take(&mut self.waiting)) {
-            self.done(id, Err(OperationError::NotThere));
+            self.done(id, Err(reason.clone()));
         }
         self.device = None;
         self.values.clear();

@@ -8,6 +8,8 @@ use std::time::Duration;
 use gimbald::actions::Action;
 use gimbald::bridge::Input;
 use gimbald::bridge::settings::Settings;
+use gimbald::gimbals::gremsy::sim as gremsy;
+use gimbald::gimbals::gremsy::version::FirmwareVersion;
 use gimbald::gimbals::mavlink_v1::sim as v1;
 use gimbald::gimbals::mavlink_v2::sim as v2;
 use gimbald::gimbals::operation::{OperationError, OperationId};
@@ -23,8 +25,8 @@ use gimbald::wire::dialect::{
 use gimbald::wire::{DatagramFrames, MavId};
 
 use crate::support::interception::{Intercepted, Interceptor, Passage};
-use crate::support::script::ground_heartbeat;
-use crate::support::world::{AUTOPILOT, GCS, MANAGER, Places, World, three_links};
+use crate::support::script::{device_information, ground_heartbeat, usual_capabilities};
+use crate::support::world::{AUTOPILOT, GCS, GIMBAL, MANAGER, Places, World, three_links};
 
 const SECOND: Duration = Duration::from_secs(1);
 const BOTH: [Family; 2] = [Family::MavlinkV1, Family::MavlinkV2];
@@ -341,4 +343,36 @@ fn parameters_outlast_the_search_for_the_family() {
     assert_eq!(set(&mut world, places, "SIM_TILT_MAX", 20.0), Ok(()));
     assert_eq!(refresh(&mut world, places), Ok(()));
     assert_eq!(known(&world)["SIM_TILT_MAX"], 20.0);
+}
+
+/// "Each is answered by exactly one": at once, when a gimbal turns out to be a Gremsy, which is read when it has started, and
+/// when another one is found in a Gremsy's place.
+#[test]
+fn who_waits_is_told_when_the_gimbal_is_another() {
+    // It does not say who made it.
+    let firmware = FirmwareVersion::official(7, 5, 6);
+    let settings = gremsy::DeviceSettings { firmware, ..gremsy::DeviceSettings::of(gremsy::Generation::V1) };
+    let camera = GimbalSettings::found("camera".to_owned());
+    let (mut world, places) = World::empty(Settings { gimbals: vec![camera], ..three_links() });
+    world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
+    world.install(places.gimbal, gremsy::Device::new(Timestamp::ZERO, settings));
+    for _ in 0..100 {
+        if world.snapshot().gimbals[0].state != "alive" {
+            run(&mut world, places, SECOND / 10);
+        }
+    }
+    assert_eq!(world.snapshot().gimbals[0].family, "mavlink_v2", "as every gimbal is at first");
+    let id = ask(&mut world, "refresh-parameters", None, "");
+    run(&mut world, places, 5 * SECOND);
+    assert_eq!(world.snapshot().gimbals[0].family, "gremsy", "by the names of its parameters");
+    assert_eq!(world.answers, [(id, failed(OperationError::NotReady))]);
+
+    run(&mut world, places, 25 * SECOND);
+    assert!(known(&world).len() > 30);
+    world.answers.clear();
+    let id = ask(&mut world, "refresh-parameters", None, "");
+    let other = device_information(world.now, usual_capabilities());
+    world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_INFORMATION(other));
+    assert_eq!(world.snapshot().gimbals[0].family, "mavlink_v2", "somebody else made it");
+    assert_eq!(world.answers, [(id, failed(OperationError::NotThere))]);
 }
