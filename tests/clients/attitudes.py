@@ -73,7 +73,9 @@ class Heading:
 class Attitudes:
     """Filled by the client's own thread or loop; judged by the script."""
 
-    def __init__(self):
+    def __init__(self, arrives_within=6):
+        """`arrives_within`: how long the farthest way may take, seconds."""
+        self._arrives_within = arrives_within
         self._lock = threading.Lock()
         self._seen = deque(maxlen=2000)
         # From where the last GIMBAL_DEVICE_ATTITUDE_STATUS counted the yaw.
@@ -111,7 +113,7 @@ class Attitudes:
         with self._lock:
             return self._seen[-1]
 
-    def wait_at(self, timeout=6, steady=5, within=1.0, **wanted):
+    def wait_at(self, steady=5, within=1.0, **wanted):
         """Waits until the last few are all at the wanted angles; gives the last one."""
 
         def last():
@@ -129,7 +131,7 @@ class Attitudes:
             at = last()[-1:]
             return f"within {within}° of {wanted}; {f'last seen {at[0]}' if at else 'no attitude at all'}"
 
-        wait_for(missing, arrived, timeout)
+        wait_for(missing, arrived, self._arrives_within)
         return last()[-1]
 
     def expect_still(self, seconds, within=1.0, **wanted):

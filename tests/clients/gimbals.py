@@ -18,8 +18,10 @@ class Gimbal(NamedTuple):
     within_north: float = 1.0
     # From where GIMBAL_DEVICE_ATTITUDE_STATUS counts the yaw of this gimbal; None where that changes.
     status_yaw: str = "yaw_north"
-    # Whether it tells that it is retracted, or only goes to where it is stowed.
-    tells_retract: bool = True
+    # How long its farthest way takes, seconds.
+    arrives_within: float = 6
+    # More of its `[[gimbal]]` entry.
+    entry: str = ""
 
     @property
     def suffix(self):
@@ -32,12 +34,11 @@ class Gimbal(NamedTuple):
 
     def settings(self):
         """Its entry in the configuration."""
-        return f'[[gimbal]]\nname = "camera"\nlink = "gimbal"\nfamily = "{self.family}"\n' if self.family else ""
+        return f'[[gimbal]]\nname = "camera"\nlink = "gimbal"\nfamily = "{self.family}"\n{self.entry}' if self.family else ""
 
 
 def gremsy(generation):
-    # Faster than it comes, as the steps were written for a gimbal that turns at 100 degrees per second.
-    options = ("--family", "gremsy", "--gremsy-generation", generation, "--slew", "100")
+    options = ("--family", "gremsy", "--gremsy-generation", generation)
     # Only the one that is no v2 device needs an id of its own.
     device = {"v1": 1, "v2": 154}[generation]
     # The second generation speaks for itself: from North while yaw is locked, else from the nose.
@@ -50,7 +51,10 @@ def gremsy(generation):
         "GREMSY",
         "MIO",
         status_yaw=status_yaw,
-        tells_retract=False,
+        # It turns by 30 degrees per second, and by 320 to either side.
+        arrives_within=25,
+        # The second generation shows the flag only while its motors are off.
+        entry={"v1": "", "v2": "retract_allowed = true\n"}[generation],
     )
 
 

@@ -146,10 +146,7 @@ class Operator:
         client.tilt_90()
         self.camera.wait_at(pitch=-90)
         client.retract()
-        if self.rig.kind.tells_retract:
-            wait_for("the label 'Retracted'", lambda: active.label == "Retracted", 1)
-        else:
-            self.camera.wait_at(pitch=0, yaw_vehicle=0)
+        wait_for("the label 'Retracted'", lambda: active.label == "Retracted", 1)
         self.center()
         wait_for("the label 'Yaw follow'", lambda: active.label == "Yaw follow", 1)
 

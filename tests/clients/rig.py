@@ -228,7 +228,7 @@ class Rig:
         self._processes = []
         self._wires = []
         # Where the camera looks, by the gimbal's own word on its cable.
-        self.camera = Attitudes()
+        self.camera = Attitudes(gimbal.arrives_within)
         self._camera_decoder = mavlink.MAVLink(None)
         self._camera_decoder.robust_parsing = True
         # Where the vehicle heads, by its own word.
