@@ -8,14 +8,15 @@ use crate::gimbals::gremsy::parameters::ParameterTable;
 use crate::gimbals::mavlink_v2::packet;
 use crate::gimbals::report::Identity;
 use crate::gimbals::settings::Family;
-use crate::wire::Frame;
 use crate::wire::dialect::{HEARTBEAT_DATA, PARAM_VALUE_DATA};
 use crate::wire::ids::{mav_autopilot, mav_type, message};
+use crate::wire::{Frame, Version};
 
 /// Somebody on the line.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Party {
     frames: u32,
+    sends_mavlink_2: bool,
     /// `MAV_TYPE` and `MAV_AUTOPILOT`.
     heartbeat: Option<(u8, u8)>,
     /// 283 or 285 about itself was heard from it.
@@ -32,6 +33,7 @@ pub struct Party {
 impl Party {
     pub fn handle_frame(&mut self, frame: &Frame<'_>) {
         self.frames = self.frames.saturating_add(1);
+        self.sends_mavlink_2 |= frame.version() == Version::V2;
         if let Some(heartbeat) = frame.decode::<HEARTBEAT_DATA>() {
             self.heartbeat = Some((heartbeat.mavtype, heartbeat.autopilot));
         }
@@ -122,10 +124,9 @@ impl Party {
     pub fn is_ground_station(&self) -> bool {
         self.heartbeat.is_some_and(|(kind, _)| kind == mav_type::GCS)
     }
-}
 
-impl fmt::Display for Party {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    /// What it is, for people.
+    fn describe(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if !self.is_gimbal() {
             return write!(f, "MAVLink, no gimbal");
         }
@@ -147,17 +148,56 @@ impl fmt::Display for Party {
     }
 }
 
+impl fmt::Display for Party {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.describe(f)?;
+        // One that may send either version has heard our MAVLink 2 by now.
+        if !self.sends_mavlink_2 {
+            write!(f, "; it sends MAVLink 1 frames only, and has to understand MAVLink 2")?;
+        }
+        Ok(())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::wire::{DatagramFrames, MavId, encode_to_vec};
 
     /// Names come from devices.
     #[test]
     fn names_of_gimbals_do_not_command_the_terminal() {
         let identity = crate::gimbals::report::Identity { vendor: "a\u{202e}b".to_owned(), ..Default::default() };
-        let mut party = Party { is_gimbal_device: true, ..Party::default() };
+        let mut party = Party { is_gimbal_device: true, sends_mavlink_2: true, ..Party::default() };
         assert_eq!(party.to_string(), "mavlink_v2, which does not tell its make");
         party.identity = Some(identity);
         assert_eq!(party.to_string(), "mavlink_v2, a\u{fffd}b");
+    }
+
+    /// What it is told is MAVLink 2, which one that speaks version 1 may not understand.
+    #[test]
+    fn who_sends_mavlink_1_only_is_named() {
+        let heartbeat = HEARTBEAT_DATA {
+            custom_mode: 0,
+            mavtype: mav_type::GIMBAL,
+            autopilot: mav_autopilot::INVALID,
+            base_mode: 0,
+            system_status: 4,
+            mavlink_version: 3,
+        };
+        let version_2 = encode_to_vec(MavId::new(1, 154), 0, &heartbeat);
+        let payload = [0, 0, 0, 0, mav_type::GIMBAL, mav_autopilot::INVALID, 0, 4, 3];
+        let mut version_1 = vec![0xfe, 9, 0, 1, 154, 0];
+        version_1.extend(payload);
+        version_1.extend([0xce, 0x06]); // its checksum
+        let mut party = Party::default();
+        let mut hear = |bytes: &[u8]| {
+            party.handle_frame(&DatagramFrames::new(bytes).next_frame().expect("a frame"));
+            party.to_string()
+        };
+        let beats = "a gimbal that only beats: mavlink_v1, or a mavlink_v2 that is still starting";
+        let warning = "; it sends MAVLink 1 frames only, and has to understand MAVLink 2";
+        assert_eq!(hear(&version_1), format!("{beats}{warning}"));
+        assert_eq!(hear(&version_2), beats);
     }
 }

@@ -11,7 +11,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use self::assumed::{AssumedPose, capabilities};
-use self::watching::{DOES_NOT_MOVE_AND_WHAT_TO_DO, DoesNotMove};
+use self::watching::DoesNotMove;
 use super::config::{V1RadioControl, V1Settings};
 use super::obedience::Obedience;
 use super::packet::{self, MountControl};
@@ -29,7 +29,7 @@ use crate::timers::TimerTable;
 use crate::timestamp::Timestamp;
 use crate::wire::dialect::{COMMAND_LONG_DATA, HEARTBEAT_DATA, MOUNT_ORIENTATION_DATA, MOUNT_STATUS_DATA, MessageData};
 use crate::wire::ids::{CommandResult, FailureFlags, GimbalFlags, mav_state, message};
-use crate::wire::{Frame, MavId};
+use crate::wire::{Frame, MavId, Version};
 
 /// A gimbal not heard for so long is lost: five heartbeats.
 pub const LOST_AFTER: Duration = Duration::from_secs(5);
@@ -69,6 +69,8 @@ pub struct MavlinkV1Driver {
     gremsy_questions_left: u8,
     obedience: Obedience,
     does_not_move: DoesNotMove,
+    /// It has sent MAVLink 2, and so understands what it is told in it.
+    sends_mavlink_2: bool,
     assumed: AssumedPose,
     /// Read when somebody asks for that, and learned from what it tells others.
     parameters: Parameters,
@@ -125,6 +127,7 @@ impl MavlinkV1Driver {
             gremsy_questions_left: GREMSY_QUESTIONS,
             obedience: Obedience::default(),
             does_not_move: DoesNotMove::default(),
+            sends_mavlink_2: false,
             assumed: AssumedPose::default(),
             parameters: Parameters::of_any_gimbal(),
             timers: TimerTable::default(),
@@ -297,6 +300,7 @@ impl MavlinkV1Driver {
         self.clock.forget();
         // Another may come in its place.
         self.says_gremsy = false;
+        self.sends_mavlink_2 = false;
         self.gremsy_questions_left = GREMSY_QUESTIONS;
         // What it is told next is told anew, and not before it is asked for again.
         self.wanted = None;
@@ -324,6 +328,7 @@ impl GimbalDriver for MavlinkV1Driver {
 
     fn handle_received(&mut self, now: Timestamp, frame: &Frame<'_>) {
         let Some(device) = self.device.filter(|device| *device == frame.source()) else { return };
+        self.sends_mavlink_2 |= frame.version() == Version::V2;
         match frame.message_id() {
             message::SYS_STATUS if self.alive && !self.says_gremsy && self.gremsy_questions_left > 0 => {
                 self.gremsy_questions_left -= 1;
@@ -457,7 +462,7 @@ impl GimbalDriver for MavlinkV1Driver {
 
     fn details(&self, _now: Timestamp) -> GimbalDetails {
         let wrong_family = self.says_gremsy.then(|| gremsy::wrong_family(Family::MavlinkV1));
-        let does_not_move = self.does_not_move.is_so.then(|| DOES_NOT_MOVE_AND_WHAT_TO_DO.to_owned());
+        let does_not_move = self.does_not_move.is_so.then(|| self.why_it_may_not_move());
         let faults = wrong_family.into_iter().chain(does_not_move).collect();
         GimbalDetails { faults, parameters: self.parameters.by_name(), ..GimbalDetails::default() }
     }

@@ -19,12 +19,24 @@ pub struct DoesNotMove {
 /// What the pilot is told of it.
 const DOES_NOT_MOVE: &str = "is told angles but does not move";
 
-/// And what whoever looks into it is.
-pub const DOES_NOT_MOVE_AND_WHAT_TO_DO: &str = "it is told where to look and does not move. Check that its motors are on and \
-    that nothing blocks the camera; that no radio control of its own has it; that v1_configure is true if it wants \
-    DO_MOUNT_CONFIGURE first; the wire towards it; and its family";
+/// What may be the reason, for whoever looks into it.
+const WHAT_TO_CHECK: &str = "that its motors are on and that nothing blocks the camera; that no radio control of its own \
+    has it; that v1_configure is true if it wants DO_MOUNT_CONFIGURE first; the wire towards it; and its family";
 
 impl MavlinkV1Driver {
+    /// That it does not move, and what to do about it. Everything that it is told is MAVLink 2.
+    pub(super) fn why_it_may_not_move(&self) -> String {
+        if self.sends_mavlink_2 {
+            format!("it is told where to look and does not move. Check {WHAT_TO_CHECK}")
+        } else {
+            format!(
+                "it sends MAVLink 1 frames only and may not understand MAVLink 2; it is told where to look in that and does \
+                 not move. Set it to MAVLink 2, and the autopilot's ports on the way to it (SERIALn_PROTOCOL = 2), or give it \
+                 firmware that speaks it; if it does not move then, check {WHAT_TO_CHECK}"
+            )
+        }
+    }
+
     /// Looks whether it goes where it was told to look.
     pub(super) fn watch_obedience(&mut self, now: Timestamp, frame: &Frame<'_>, attitude: Attitude<VehicleFrame>) {
         let mode = frame.decode::<MOUNT_STATUS_DATA>().map(|status| status.mount_mode);

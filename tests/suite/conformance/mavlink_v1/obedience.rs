@@ -9,6 +9,7 @@ use gimbald::timestamp::Timestamp;
 use gimbald::wire::dialect::STATUSTEXT_DATA;
 
 use super::*;
+use crate::support::wire::frame_v1;
 
 /// A flying vehicle and a gimbal, which may be told where to look.
 fn flying(device: DeviceSettings, v1: V1Settings) -> (World, Places) {
@@ -148,4 +149,34 @@ fn a_gimbal_that_moves_after_all_has_no_fault() {
         events.push((told_of_it(&world, places).1.len(), told_of_it(&world, places).2));
     }
     assert_eq!((events[20], events[45], events[58], events[119]), ((0, 0), (1, 1), (0, 1), (0, 1)));
+}
+
+/// Client checklist E132: "Everything we send is MAVLink 2": one that sends MAVLink 1 only may hear none of it, which is said
+/// first as long as it has not sent MAVLink 2.
+#[test]
+fn client_item_e132_of_a_gimbal_that_sends_mavlink_1_only_that_is_said_first() {
+    let version_2_too = "it is told where to look and does not move. Check that its motors are on";
+    let version_1_only = "it sends MAVLink 1 frames only and may not understand MAVLink 2; it is told where to look in that and \
+        does not move. Set it to MAVLink 2, and the autopilot's ports on the way to it (SERIALn_PROTOCOL = 2), or give it \
+        firmware that speaks it; if it does not move then, check that its motors are on";
+    for (sends_version_2, expected) in [(false, version_1_only), (true, version_2_too)] {
+        let settings = Settings { gimbals: vec![v1_gimbal()], ..three_links() };
+        let (mut world, places) = World::empty(settings);
+        let mut faults = Vec::new();
+        for step in 0..60 {
+            // HEARTBEAT of a gimbal and MOUNT_STATUS of one that looks ahead.
+            world.send_bytes(places.gimbal, &frame_v1(0, 50, 0, &[0, 0, 0, 0, 26, 8, 0, 4, 3]));
+            world.send_bytes(places.gimbal, &frame_v1(158, 134, 1, &[0; 14]));
+            world.send(places.ground, GCS, &ground_heartbeat());
+            if step == 8 {
+                point(&mut world, places, [-30.0, 0.0]);
+            }
+            if step == 20 && sends_version_2 {
+                world.send(places.gimbal, GIMBAL, &heartbeat(26, 4));
+            }
+            world.run_for(SECOND / 4);
+            faults = told_of_it(&world, places).1;
+        }
+        assert!(faults.len() == 1 && faults[0].starts_with(expected), "{faults:?}");
+    }
 }
