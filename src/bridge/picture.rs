@@ -178,7 +178,11 @@ impl Bridge {
     }
 }
 
+/// `None` also while the gimbal is left to its radio control, whichever way it was: nobody here tells it where to look.
 fn setpoint_snapshot(tracking: &Tracking, names: Names) -> Option<SetpointSnapshot> {
+    if tracking.is_handed_over() {
+        return None;
+    }
     let mode = tracking.mode()?.to_owned();
     let source = tracking.source().map(|source| names.of(source));
     let (pitch, yaw) = tracking.nudged();

@@ -22,7 +22,7 @@ impl Tracking {
     }
 
     /// Whether it is, or is to be, in the hands of its radio control because a client asked for that.
-    pub(super) fn is_handed_over(&self) -> bool {
+    pub fn is_handed_over(&self) -> bool {
         hands_over(&self.aim) || self.left_to_radio_control
     }
 

@@ -289,6 +289,7 @@ fn a_v2_client_hands_a_v1_gimbal_to_its_radio_control() {
         }
     };
     look(&mut world, places, [NAN, NAN], 256.0 + 44.0);
+    assert_eq!(world.snapshot().gimbals[0].setpoint, None, "it does not look where anybody told it to");
     assert_near(only(told(&mut world, places)), [0.0, 0.0, 0.0, 3.0]);
     keep(&mut world);
     let status: Vec<GIMBAL_DEVICE_ATTITUDE_STATUS_DATA> = world.take_messages(places.ground);

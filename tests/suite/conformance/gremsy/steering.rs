@@ -329,8 +329,12 @@ fn neutral_takes_it_home() {
 #[test]
 fn a_gimbal_that_was_handed_to_its_radio_control_is_told_nothing() {
     let (mut world, places) = running(Generation::V1);
+    demand(&mut world, places, [-10.0, 20.0, NAN, NAN, 0.0]);
+    run(&mut world, places, SECOND);
+    world.forget();
     demand(&mut world, places, [0.0, 0.0, NAN, NAN, 256.0]);
     run(&mut world, places, 3 * SECOND);
+    assert_eq!(seen(&world).setpoint, None);
     let (commands, setpoints) = orders(&mut world, places);
     assert_eq!((commands, setpoints), (vec![packet::hand_to_rc(GIMBAL)], vec![]));
     assert!(is_handed_over(&world), "{:?}", seen(&world).flags);

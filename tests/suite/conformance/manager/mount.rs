@@ -95,6 +95,7 @@ fn statement_42_radio_control_gets_a_gimbal_that_has_one() {
         world.send(places.ground, GCS, &command);
         let setpoint = only_setpoint(&mut world, places);
         assert_eq!(setpoint.flags, 44 | 256, "{command:?}");
+        assert_eq!(world.snapshot().gimbals[0].setpoint, None, "{command:?}");
         assert_near(pitch_yaw_deg(setpoint.q).0, -10.0, 0.001);
         assert_eq!(world.result_of(places.ground, GCS, &control([-20.0, 0.0, 10.0], 2.0)), Some(ACCEPTED));
         assert_eq!(only_setpoint(&mut world, places).flags, 44);

@@ -26,6 +26,7 @@ fn a_54_a_client_hands_the_gimbal_to_its_radio_control_and_takes_it_back() {
     assert_eq!(world.result_of(places.ground, GCS, &hand_over), Some(ACCEPTED));
     let told = only_setpoint(&mut world, places);
     assert_eq!(told.flags, 44 | EXCLUSIVE);
+    assert_eq!(world.snapshot().gimbals[0].setpoint, None, "it does not look where anybody told it to");
     let (pitch, yaw) = pitch_yaw_deg(told.q);
     assert_near(pitch, -20.0, 0.001);
     assert_near(yaw, 30.0, 0.001);
@@ -34,6 +35,7 @@ fn a_54_a_client_hands_the_gimbal_to_its_radio_control_and_takes_it_back() {
     assert_eq!(setpoints(&mut world, places).len(), 10);
     run_with(&mut world, places, SECOND, EXCLUSIVE);
     assert_eq!(setpoints(&mut world, places), []);
+    assert_eq!(world.snapshot().gimbals[0].setpoint, None);
     let told: Vec<GIMBAL_MANAGER_STATUS_DATA> = world.take_messages(places.ground);
     assert!(told.iter().all(|status| status.flags == u32::from(44 | EXCLUSIVE)), "{told:?}");
 
@@ -41,6 +43,8 @@ fn a_54_a_client_hands_the_gimbal_to_its_radio_control_and_takes_it_back() {
     let take_back = pitchyaw(-10.0, 0.0, NAN, NAN, 44.0);
     assert_eq!(world.result_of(places.ground, GCS, &take_back), Some(ACCEPTED));
     assert_eq!(only_setpoint(&mut world, places).flags, 44);
+    let setpoint = world.snapshot().gimbals[0].setpoint.clone().expect("it is told where to look");
+    assert_eq!((setpoint.mode.as_str(), setpoint.source.as_deref()), ("angle", Some("255/190")));
     run_with(&mut world, places, SECOND / 2, EXCLUSIVE);
     run_with(&mut world, places, SECOND * 2, 0);
     let told = setpoints(&mut world, places);
