@@ -85,6 +85,9 @@ fn run(
             if let Some(held) = held.iter().find(|held| held.device == port.device) {
                 say(errors, format_args!("{shown}: left alone, it belongs to the running gimbald, which says:"));
                 say(output, format_args!("{held}"));
+                if let Some(advice) = held.advice() {
+                    say(errors, format_args!("{shown}: {advice}"));
+                }
                 told |= !held.gimbals.is_empty();
                 continue;
             }

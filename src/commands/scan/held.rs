@@ -31,6 +31,8 @@ pub struct Held {
     baud: u32,
     /// `up` or `down`.
     state: String,
+    /// Somebody was heard there.
+    pub is_understood: bool,
     pub gimbals: Vec<GimbalSnapshot>,
 }
 
@@ -42,7 +44,18 @@ impl Held {
         let heard: Vec<&String> = link.peers.iter().flat_map(|peer| &peer.components).collect();
         let is_there = |gimbal: &&GimbalSnapshot| gimbal.device.as_ref().is_some_and(|device| heard.contains(&device));
         let gimbals = gimbals.iter().filter(is_there).cloned().collect();
-        Some(Self { device, path, baud, state: link.state.clone(), gimbals })
+        Some(Self { device, path, baud, state: link.state.clone(), is_understood: !heard.is_empty(), gimbals })
+    }
+
+    /// What there is to do where the daemon understands nothing: nobody but it can try the port while it runs.
+    pub fn advice(&self) -> Option<String> {
+        (!self.is_understood).then(|| {
+            format!(
+                "nothing that it understands was heard there at {} baud; to try the other rates, stop the service \
+                 (sudo systemctl stop gimbald) and scan again",
+                self.baud
+            )
+        })
     }
 }
 

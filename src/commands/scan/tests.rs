@@ -169,17 +169,14 @@ fn an_autopilot_is_said_to_be_no_gimbal() {
     autopilot.end();
 }
 
-/// "It asks a running daemon first and never opens a port that a process holds."
-#[test]
-fn a_port_of_the_running_daemon_is_left_alone() {
-    let gimbal = Plugged::new(Device::new(Timestamp::ZERO, DeviceSettings::default()), 1);
+/// A daemon that has `port` open at 57600 baud, heard `components` there, and is asked once.
+fn daemon_with(port: &Path, components: &[&str]) -> (Target, JoinHandle<()>) {
     let mut snapshot = crate::http::canned::snapshot();
-    snapshot.links[0].endpoint = format!("serial:{}:57600", gimbal.path.display());
-    snapshot.links[0].peers[0].components = vec!["1/154".to_owned()];
+    snapshot.links[0].endpoint = format!("serial:{}:57600", port.display());
+    snapshot.links[0].peers[0].components = components.iter().map(|id| (*id).to_owned()).collect();
     let body = serde_json::to_string(&snapshot).expect("JSON");
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let daemon = format!("http://{}", listener.local_addr().expect("it is bound"));
-    let daemon = Target::parse(&daemon).expect("right");
     let server = std::thread::spawn(move || {
         let (mut client, _) = listener.accept().expect("a client");
         let mut asked = Vec::new();
@@ -190,6 +187,14 @@ fn a_port_of_the_running_daemon_is_left_alone() {
         }
         write!(client, "HTTP/1.1 200 OK\r\nContent-Length: {}\r\n\r\n{body}", body.len()).expect("it listens");
     });
+    (Target::parse(&daemon).expect("right"), server)
+}
+
+/// "It asks a running daemon first and never opens a port that a process holds."
+#[test]
+fn a_port_of_the_running_daemon_is_left_alone() {
+    let gimbal = Plugged::new(Device::new(Timestamp::ZERO, DeviceSettings::default()), 1);
+    let (daemon, server) = daemon_with(&gimbal.path, &["1/154"]);
 
     let (result, output, errors) = gimbal.scan(&gimbal.path, &daemon);
 
@@ -200,6 +205,30 @@ fn a_port_of_the_running_daemon_is_left_alone() {
     assert_eq!(output, expected);
     assert_eq!(errors, format!("{shown}: left alone, it belongs to the running gimbald, which says:\n"));
     assert_eq!(gimbal.end(), 0);
+}
+
+/// "`gimbald scan` finds baud rate … and never opens a port that a process holds": where the daemon may have the wrong one,
+/// it has to make room; who hears somebody there has the right one, gimbal or not.
+#[test]
+fn a_daemon_that_understands_nothing_has_to_make_room() {
+    for (components, is_understood) in [(&[][..], false), (&["1/1"], true)] {
+        let gimbal = Plugged::new(Device::new(Timestamp::ZERO, DeviceSettings::default()), 2);
+        let (daemon, server) = daemon_with(&gimbal.path, components);
+
+        let (result, output, errors) = gimbal.scan(&gimbal.path, &daemon);
+
+        server.join().expect("no panic");
+        assert!(matches!(result, Err(ScanError::NothingAnswered)), "{result:?}");
+        let shown = gimbal.path.display();
+        assert_eq!(output, format!("{shown}: 57600 baud, up\n"));
+        let advice = format!(
+            "{shown}: nothing that it understands was heard there at 57600 baud; to try the other rates, stop the service \
+             (sudo systemctl stop gimbald) and scan again\n"
+        );
+        let advice = if is_understood { "" } else { &advice };
+        assert_eq!(errors, format!("{shown}: left alone, it belongs to the running gimbald, which says:\n{advice}"));
+        assert_eq!(gimbal.end(), 0);
+    }
 }
 
 /// "69 when not, 64 for a DEVICE that is no tty (clear text)."
