@@ -12,6 +12,8 @@ pub struct Capabilities {
     pub turns: bool,
     /// Its maker's commands for motors, modes and a restart are for it.
     pub operates: bool,
+    /// It cannot tell whether it has a radio control of its own, and the configuration (`v1_radio_control`) says no.
+    pub radio_control_untold: bool,
 }
 
 impl Capabilities {
@@ -23,6 +25,11 @@ impl Capabilities {
             | CapFlags::HAS_PITCH_LOCK
             | CapFlags::HAS_YAW_AXIS
             | CapFlags::HAS_YAW_FOLLOW;
-        Self { flags, limits: Limits::default(), turns: true, operates: false }
+        Self { flags, limits: Limits::default(), turns: true, operates: false, radio_control_untold: false }
+    }
+
+    /// Why it is not handed to a radio control of its own; `known` where it is known to have none.
+    pub fn why_no_radio_control(&self, known: &'static str) -> &'static str {
+        if self.radio_control_untold { "v1_radio_control_is_none" } else { known }
     }
 }

@@ -215,7 +215,8 @@ fn refused(not_done: NotDone) -> Refusal {
             let status = match (refusal.reason, refusal.result) {
                 ("nobody_in_control" | "only_for_the_holder" | "other_vehicle", _) => StatusCode::CONFLICT,
                 (reason, _) if STANDS_IN_THE_WAY.contains(&reason) => StatusCode::CONFLICT,
-                ("cannot_retract" | "no_rc_inputs", _) | (_, CommandResult::Unsupported) => StatusCode::NOT_IMPLEMENTED,
+                ("cannot_retract" | "no_rc_inputs" | "v1_radio_control_is_none", _)
+                | (_, CommandResult::Unsupported) => StatusCode::NOT_IMPLEMENTED,
                 (_, CommandResult::TemporarilyRejected | CommandResult::Failed) => StatusCode::SERVICE_UNAVAILABLE,
                 _ => StatusCode::UNPROCESSABLE_ENTITY,
             };

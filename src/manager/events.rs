@@ -1,6 +1,7 @@
 //! What happened around a gimbal, as far as a person may want to know it.
 
 use super::control::{Change, How, Place};
+use crate::gimbals::mavlink_v1::config::NO_RADIO_CONTROL;
 use crate::gimbals::operation::{Operation, OperationError, STARTING};
 use crate::wire::MavId;
 
@@ -304,7 +305,8 @@ fn explain(reason: &str) -> String {
         }
         "looks_like_a_place" => "its angles look like a place, which MOUNT_CONFIGURE or DO_MOUNT_CONFIGURE in mode 4 makes of them",
         "place_in_the_first_parameters" => "it has the place in parameters 1 to 3, as of old; it belongs into 4 to 6",
-        "mount_mode_rc_targeting_unsupported" => "the gimbal has no radio control of its own",
+        "v1_radio_control_is_none" => NO_RADIO_CONTROL,
+        "no_rc_inputs" | "mount_mode_rc_targeting_unsupported" => "the gimbal has no radio control of its own",
         "mount_mode_sysid_target_unsupported" => {
             "a mount follows no other vehicle; DO_SET_ROI_LOCATION (195) with its position, again and again, does"
         }

@@ -149,8 +149,9 @@ impl GimbalManager {
             Mode::Retract => GimbalFlags::RETRACT,
             Mode::Neutral => GimbalFlags::NEUTRAL,
             Mode::RadioControl => {
-                if !self.steerable()?.flags.contains(CapFlags::HAS_RC_INPUTS) {
-                    let reason = "mount_mode_rc_targeting_unsupported";
+                let capabilities = self.steerable()?;
+                if !capabilities.flags.contains(CapFlags::HAS_RC_INPUTS) {
+                    let reason = capabilities.why_no_radio_control("mount_mode_rc_targeting_unsupported");
                     return Err(Refusal { result: CommandResult::Unsupported, reason });
                 }
                 GimbalFlags::RC_EXCLUSIVE

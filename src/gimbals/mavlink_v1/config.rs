@@ -26,6 +26,11 @@ pub enum V1RadioControl {
     Mode,
 }
 
+/// What is answered to who wants a gimbal to follow its radio control where that is `None`.
+pub const NO_RADIO_CONTROL: &str = "v1_radio_control is \"none\", so this gimbal is taken to have no radio control of its own. \
+    If it has one, say in its [[gimbal]] entry how that gets the gimbal: v1_radio_control = \"silence\" (whenever the gimbal is \
+    told nothing) or \"mode\" (by DO_MOUNT_CONTROL in mode 3), and restart gimbald";
+
 impl V1RadioControl {
     pub const fn name(self) -> &'static str {
         match self {

@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use self::assumed::{AssumedPose, capabilities};
 use self::watching::DoesNotMove;
-use super::config::{V1RadioControl, V1Settings};
+use super::config::{NO_RADIO_CONTROL, V1RadioControl, V1Settings};
 use super::obedience::Obedience;
 use super::packet::{self, MountControl};
 use crate::geometry::{Attitude, GimbalAngles, VehicleFrame};
@@ -45,11 +45,6 @@ const OPEN_LOOP_INTERVAL: Duration = Duration::from_millis(100);
 
 /// A gimbal that sends `SYS_STATUS`, as no plain v1 gimbal is known to, is asked so often whether it is a Gremsy.
 const GREMSY_QUESTIONS: u8 = 3;
-
-/// No v1 gimbal tells whether it has one.
-const NO_RADIO_CONTROL: &str = "v1_radio_control is \"none\", so this gimbal is taken to have no radio control of its own. \
-    If it has one, say in its [[gimbal]] entry how that gets the gimbal: v1_radio_control = \"silence\" (whenever the gimbal is \
-    told nothing) or \"mode\" (by DO_MOUNT_CONTROL in mode 3), and restart gimbald";
 
 /// Drives one v1 gimbal.
 #[derive(Debug)]

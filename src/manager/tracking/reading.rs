@@ -28,7 +28,7 @@ impl Tracking {
         if flags.intersects(GimbalFlags::RC_EXCLUSIVE | GimbalFlags::RC_MIXED)
             && !capabilities.flags.contains(CapFlags::HAS_RC_INPUTS)
         {
-            return Err(Refusal::denied("no_rc_inputs"));
+            return Err(Refusal::denied(capabilities.why_no_radio_control("no_rc_inputs")));
         }
         if flags.contains(GimbalFlags::RETRACT) {
             if !capabilities.flags.contains(CapFlags::HAS_RETRACT) {

@@ -21,8 +21,8 @@ use gimbald::wire::dialect::{
 };
 
 use crate::support::script::{
-    ACCEPTED, NAN, ack, autopilot_state, command_long, device_information, device_status, gimbal_heartbeat,
-    ground_heartbeat, of, pitch_yaw_deg, px4_heartbeat, quaternion, usual_capabilities,
+    ACCEPTED, DENIED, NAN, UNSUPPORTED, ack, autopilot_state, command_long, device_information, device_status,
+    gimbal_heartbeat, ground_heartbeat, of, pitch_yaw_deg, px4_heartbeat, quaternion, usual_capabilities,
 };
 use crate::support::world::{AUTOPILOT, GCS, GIMBAL, MANAGER, Places, World, heartbeat, three_links};
 
@@ -301,6 +301,30 @@ fn a_v2_client_hands_a_v1_gimbal_to_its_radio_control() {
     keep(&mut world);
     let status: Vec<GIMBAL_DEVICE_ATTITUDE_STATUS_DATA> = world.take_messages(places.ground);
     assert!(status.iter().all(|status| status.flags == 44), "{status:?}");
+}
+
+/// "Bad input gets a clear error naming the place and the remedy": a client that asks for it is refused, and whoever looks is
+/// told by which key the gimbal would be handed over.
+#[test]
+fn whoever_wants_a_v1_gimbal_to_follow_radio_control_learns_the_key() {
+    let commands = [
+        (command_long(MANAGER, 1000, &[NAN, NAN, NAN, NAN, 256.0 + 44.0, 0.0, 1.0]), DENIED),
+        (command_long(MANAGER, 204, &[3.0]), UNSUPPORTED),
+        (command_long(MANAGER, 205, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 3.0]), UNSUPPORTED),
+    ];
+    for (command, result) in commands {
+        let (mut world, places) = with_gimbal(v1_gimbal());
+        assert_eq!(world.result_of(places.ground, GCS, &command), Some(result), "{command:?}");
+        assert_eq!(told(&mut world, places), [[0.0; 4]; 0]);
+        let event = world.snapshot().events[0].clone();
+        assert_eq!((event.what.as_str(), event.reason.as_deref()), ("refused", Some("v1_radio_control_is_none")));
+        assert_eq!(
+            event.text,
+            "255/190 was refused: v1_radio_control is \"none\", so this gimbal is taken to have no radio control of its own. If \
+             it has one, say in its [[gimbal]] entry how that gets the gimbal: v1_radio_control = \"silence\" (whenever the \
+             gimbal is told nothing) or \"mode\" (by DO_MOUNT_CONTROL in mode 3), and restart gimbald"
+        );
+    }
 }
 
 /// "Each reachable three ways": by its name it is handed over as by a client's demand, until the next one; where

@@ -200,9 +200,17 @@ impl GremsyDriver {
                 let yaw = limits.yaw.filter(|_| !infinite);
                 // "Retract" does work, whatever it is turned into.
                 let flags = told.flags | CapFlags::HAS_RETRACT | CapFlags::HAS_NEUTRAL;
-                Capabilities { flags, limits: Limits { yaw, ..limits }, turns: true, operates: true }
+                Capabilities {
+                    flags,
+                    limits: Limits { yaw, ..limits },
+                    turns: true,
+                    operates: true,
+                    radio_control_untold: false,
+                }
             }
-            (_, _) => Capabilities { flags: v1_flags(), limits, turns: true, operates: true },
+            (_, _) => {
+                Capabilities { flags: v1_flags(), limits, turns: true, operates: true, radio_control_untold: false }
+            }
         }
     }
 

@@ -589,5 +589,11 @@ fn capabilities(gimbal: Gimbal) -> Capabilities {
         | CapFlags::HAS_RC_INPUTS;
     let stops = |(min, max)| AxisLimits::new(Angle::from_degrees(min), Angle::from_degrees(max));
     let limits = Limits { roll: None, pitch: stops(PITCH_STOPS), yaw: stops(YAW_STOPS) };
-    Capabilities { flags: if gimbal.full() { plain | rest } else { plain }, limits, turns: true, operates: false }
+    Capabilities {
+        flags: if gimbal.full() { plain | rest } else { plain },
+        limits,
+        turns: true,
+        operates: false,
+        radio_control_untold: false,
+    }
 }
