@@ -9,6 +9,7 @@ use crate::bridge::settings::Role;
 use crate::channel::ChannelId;
 use crate::endpoint::Endpoint;
 use crate::gimbals::settings::Family;
+use crate::links::serial_port;
 use crate::token::Token;
 
 use super::environment::spelling;
@@ -124,6 +125,14 @@ fn check_endpoints(links: &[Link], http: &Http, problems: &mut Vec<Problem>) {
             };
             let found = format!("found {}, the {what} of the link in {}", endpoint.shown, place(&earlier.place));
             problems.push(endpoint.problem(found, expected));
+        }
+    }
+    for endpoint in &endpoints {
+        if let Endpoint::Serial { path, .. } = &endpoint.value
+            && let Some(what) = serial_port::leads_to_no_line(path)
+        {
+            let found = format!("found {}: {what}, where no gimbal can be", endpoint.shown);
+            problems.push(endpoint.problem(found, "a serial port such as /dev/ttyUSB0"));
         }
     }
     let listen = http.listen.as_ref().map_or(HttpSettings::DEFAULT_LISTEN, |listen| listen.value);

@@ -87,6 +87,10 @@ fn why_closed(path: &str, error: &io::Error) -> String {
 
 impl Port {
     fn open(path: &str, baud: u32) -> io::Result<Self> {
+        // To open the multiplexer makes a new pseudo-terminal, where nobody is.
+        if let Some(what) = serial_port::leads_to_no_line(path) {
+            return Err(io::Error::other(format!("it is {what}, where no gimbal can be")));
+        }
         let device = serial_port::open(path, baud)?;
         // What came in while nobody listened is stale.
         device.clear(ClearBuffer::Input)?;

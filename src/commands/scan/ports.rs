@@ -54,7 +54,7 @@ impl Port {
             return Err(PortError::NotASerialPort);
         }
         // To open the multiplexer makes a new pseudo-terminal, which stays as silent as nobody at a real port.
-        if let Some(what) = terminal_without_line(major(file.rdev()), minor(file.rdev())) {
+        if let Some(what) = serial_port::terminal_without_line(&file) {
             return Err(PortError::NoLine(what));
         }
         if let Some(holder) = holder(Path::new("/proc"), &self.device) {
@@ -71,16 +71,6 @@ impl Port {
             ErrorKind::NoDevice => PortError::InUse,
             ErrorKind::InvalidInput | ErrorKind::Unknown | ErrorKind::Io(_) => PortError::Open(error.description),
         })
-    }
-}
-
-/// What a terminal is that leads to no line, by the numbers of its device (the kernel's `devices.txt`).
-const fn terminal_without_line(major: u64, minor: u64) -> Option<&'static str> {
-    match (major, minor) {
-        (2, _) | (5, 2) => Some("what makes pseudo-terminals"),
-        (4, 0..64) | (5, 1) => Some("a console of this computer"),
-        (5, 0) => Some("the terminal that gimbald was started from"),
-        _ => None,
     }
 }
 
@@ -223,21 +213,6 @@ mod tests {
             let refused = Port::at(Path::new(path)).expect("it is there").open(115_200).map(drop);
             let text = refused.expect_err("it is no port").to_string();
             assert_eq!(text, "what makes pseudo-terminals, where no gimbal can be", "{path}");
-        }
-        for (numbers, what) in [
-            ((2, 7), Some("what makes pseudo-terminals")),
-            ((4, 0), Some("a console of this computer")),
-            ((4, 63), Some("a console of this computer")),
-            ((4, 64), None), // ttyS0
-            ((5, 0), Some("the terminal that gimbald was started from")),
-            ((5, 1), Some("a console of this computer")),
-            ((5, 64), None),   // cua0
-            ((136, 0), None),  // pts/0
-            ((166, 0), None),  // ttyACM0
-            ((188, 0), None),  // ttyUSB0
-            ((204, 64), None), // ttyAMA0
-        ] {
-            assert_eq!(terminal_without_line(numbers.0, numbers.1), what, "{numbers:?}");
         }
     }
 

@@ -26,6 +26,18 @@ fn a_port_that_somebody_holds_is_said_to_be_held() {
     assert_eq!(why_closed("/nowhere/gimbal", &gone), "no such file or directory");
 }
 
+/// A path may lead elsewhere after the configuration was checked.
+#[test]
+fn a_terminal_without_a_line_is_not_opened() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("gimbal");
+    symlink("/dev/ptmx", &path).expect("the path is free");
+    let mut rig = rig(&path);
+
+    let reason = "it is what makes pseudo-terminals, where no gimbal can be";
+    assert_eq!(rig.next(), Seen::Down(format!("cannot open {}: {reason}", path.display())));
+}
+
 /// A pseudo-terminal that can be pulled and plugged in again behind a path that stays.
 struct Cable {
     directory: tempfile::TempDir,

@@ -123,3 +123,19 @@ fn two_links_cannot_share_a_port() {
     let page = "c.toml:4: link.ground.endpoint: found \"tcpin:0.0.0.0:8080\", the port of http.listen; expected a port of its own";
     assert_eq!(check(&LINK.replace("udpin:0.0.0.0:14550", "tcpin:0.0.0.0:8080"), &[]), refused(&[page]));
 }
+
+/// "Bad input gets a clear error": whoever opens the multiplexer finds a pseudo-terminal where nobody is, and no gimbal ever.
+#[test]
+fn a_link_leads_to_a_line() {
+    for path in ["/dev/ptmx", "/dev/../dev/ptmx"] {
+        let text = LINK.replace("udpin:0.0.0.0:14550", &format!("serial:{path}:115200"));
+        let problem = format!(
+            "c.toml:4: link.ground.endpoint: found \"serial:{path}:115200\": what makes pseudo-terminals, where no gimbal can \
+             be; expected a serial port such as /dev/ttyUSB0"
+        );
+        assert_eq!(check(&text, &[]), refused(&[&problem]));
+    }
+    // It may come.
+    let text = LINK.replace("udpin:0.0.0.0:14550", "serial:/dev/ttyUSB77:115200");
+    assert_eq!(check(&text, &[]).code, Some(0));
+}
