@@ -2,6 +2,7 @@ use super::*;
 use crate::geometry::{Angle, AngularRate, YawFrame};
 use crate::gimbals::operation::{Axis, AxisMotion, Operation, RadioType, ResetMode, Stream, StreamRate};
 use crate::manager::request::AxisDemand;
+use crate::manager::roi::Datum;
 
 fn read(command: &str, in_path: Option<&str>, body: &str) -> Result<Asked, String> {
     let action = Action::of_command(command).expect(command);
@@ -169,4 +170,20 @@ fn a_path_holds_its_field_whatever_it_is() {
     let action = Action::of_command("set-parameter").expect("it is there");
     assert_eq!(action.path_with(Some("A/B C%ä")), "parameters/A%2FB%20C%25%C3%A4");
     assert_eq!(Action::of_command("stop").expect("it is there").path_with(None), "stop");
+}
+
+/// "`altitude_reference`: mean sea level (the default), or home".
+#[test]
+fn the_altitude_of_a_place_counts_from_what_is_named() {
+    let roi = Action::of_command("roi").expect("it is there");
+    for (reference, expected) in [
+        ("", Datum::MeanSeaLevel),
+        (r#", "altitude_reference": "amsl""#, Datum::MeanSeaLevel),
+        (r#", "altitude_reference": "home""#, Datum::Home),
+    ] {
+        let body = format!(r#"{{"latitude_deg": 47.5, "longitude_deg": 8.5, "altitude_m": 50{reference}}}"#);
+        let asked = roi.read(None, body.as_bytes());
+        let (latitude_deg, longitude_deg, altitude_m) = (47.5, 8.5, 50.0);
+        assert_eq!(asked, Ok(Asked::LookAt { latitude_deg, longitude_deg, altitude_m, datum: expected }), "{body}");
+    }
 }

@@ -287,6 +287,7 @@ mod tests {
             ("stream-rate raw_imu 0", "expected a whole number from 1 to 200, or off or default"),
             ("control grab", "possible values: take, release"),
             ("turn --yaw-dps 5 --for 0", "expected a number of seconds from 0.1 to 3600"),
+            ("turn --yaw-dps 5 --for 3601", "expected a number of seconds from 0.1 to 3600"),
             ("stop --for 1", "unexpected argument '--for'"),
             ("dance", "unexpected argument 'dance'"),
         ] {

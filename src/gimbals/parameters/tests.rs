@@ -360,6 +360,22 @@ fn a_refresh_is_answered_when_everything_was_read() {
     assert_eq!(line.done, [(21_010, ParameterOutput::Settled), done(ID), done(OperationId(8))]);
 }
 
+/// Every queue has a bound: who asks for one more reading than are waited for is told so at once, and the others have theirs.
+#[test]
+fn so_many_wait_for_a_refresh_and_no_more() {
+    let mut line = Line::settled(&NAMES);
+    for id in 0..9 {
+        line.parameters.refresh_for(line.now, OperationId(id));
+    }
+    line.settle();
+    let busy = ParameterOutput::Done { id: OperationId(8), result: Err(OperationError::Busy) };
+    assert_eq!(line.done, [(20_000, busy)]);
+    line.done.clear();
+    line.run_for(5_000);
+    let done = |id| (21_010, ParameterOutput::Done { id: OperationId(id), result: Ok(()) });
+    assert_eq!(line.done[1..], (0..8).map(done).collect::<Vec<_>>());
+}
+
 #[test]
 fn what_cannot_be_set_is_refused_at_once() {
     let mut line = Line::settled(&NAMES);

@@ -243,6 +243,20 @@ mod tests {
         assert!(changes > 0 && overruled == 0, "{changes} {overruled}");
     }
 
+    /// What it asks for by a command it asks for anew, and so does what moves after that.
+    #[test]
+    fn a_command_ends_that_it_is_overruled() {
+        let mut run = Run::default();
+        run.next(pitch(0.0));
+        run.sweep(0.0, -10.0, 5.0);
+        run.stream.overrule(run.now);
+        assert!(run.stream.is_overruled());
+        run.stream.note_command(run.now);
+        assert_eq!((run.stream.is_overruled(), run.stream.changed()), (false, Some(run.now)));
+        let (changes, overruled) = run.sweep(-10.0, -20.0, 5.0);
+        assert!(changes > 0 && overruled == 0, "{changes} {overruled}");
+    }
+
     /// Whoever is obeyed while it rests has not overruled what comes next.
     #[test]
     fn a_demand_that_rests_is_not_overruled() {

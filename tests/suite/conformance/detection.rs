@@ -1,6 +1,7 @@
 //! `family = "auto"`: what a gimbal speaks is found out by listening, and nothing of that moves it.
 
 mod replaced;
+mod weighing;
 
 use std::cell::Cell;
 use std::rc::Rc;

@@ -215,6 +215,23 @@ fn a43_another_companions_manager_is_named_where_it_claims_our_gimbal() {
     }
 }
 
+/// Who speaks under the id of our own manager is told of as that, and not as its rival besides; and of what an autopilot says
+/// of a gimbal only 1 to 6 are gimbals that it drives itself.
+#[test]
+fn a43_neither_our_own_id_nor_a_devices_own_word_is_a_rival_manager() {
+    let (mut world, places) = with_device();
+    world.send(places.ground, MANAGER, &status_of(154));
+    let conflicts = world.snapshot().conflicts;
+    assert!(conflicts.len() == 1 && !conflicts[0].contains("Switch that component's"), "{conflicts:?}");
+
+    for (device_id, told) in [(0, 0), (7, 0), (1, 1), (6, 1)] {
+        let (mut world, places) = with_device();
+        world.send(places.autopilot, AUTOPILOT, &heartbeat(2, 3));
+        world.send(places.autopilot, AUTOPILOT, &attitude_of(device_id));
+        assert_eq!(world.snapshot().conflicts.len(), told, "device {device_id}");
+    }
+}
+
 /// What a rival says as a manager is for clients, and not for the gimbal, which takes whoever speaks to it as a manager
 /// for its own (D14).
 #[test]

@@ -100,6 +100,18 @@ fn item_153_other_devices_and_other_commands_pass() {
     assert_eq!(rig.dropped("peer", "firewall"), 1);
 }
 
+/// R15: "neither to a managed device nor to any link of role `gimbal`": there may be a gimbal that is not known to us yet, or
+/// that has no manager.
+#[test]
+fn item_153_a_link_of_gimbals_is_kept_from_who_steers_whomever_he_means() {
+    let mut rig = rig(Firewall::On);
+    rig.introduce("gimbal", MavId::new(1, 100));
+    assert_eq!(rig.deliver("ground", &addressed(GROUND, SET_ATTITUDE, (1, 100))), [""; 0]);
+    assert_eq!(rig.deliver("ground", &command(GROUND, COMMAND_LONG, 205, (1, 100))), [""; 0]);
+    assert_eq!(rig.dropped("gimbal", "firewall"), 2);
+    assert_eq!(rig.deliver("ground", &command(GROUND, COMMAND_LONG, 400, (1, 100))), ["gimbal"]);
+}
+
 /// "a device's own 280/281 do not leave their link": two managers of one gimbal would be seen.
 #[test]
 fn what_a_device_says_as_a_manager_stays_on_its_link() {

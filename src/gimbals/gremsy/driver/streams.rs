@@ -195,5 +195,8 @@ mod tests {
         assert!(streams.is_silent(Timestamp::from_secs(18)));
         let rate = streams.measured(Timestamp::from_secs(13), Stream::MountOrientation).expect("it was heard");
         assert!((rate - 20.0).abs() < 1.0, "{rate}");
+        // One that has stopped has no rate: the last was heard at 12.95 s.
+        assert!(streams.measured(Timestamp::from_millis(16_949), Stream::MountOrientation).is_some());
+        assert_eq!(streams.measured(Timestamp::from_millis(16_950), Stream::MountOrientation), None);
     }
 }

@@ -154,6 +154,20 @@ fn a_value_is_set_in_the_gimbals_own_way() {
     }
 }
 
+/// A value travels in single precision: one that has none there is set when the nearest comes back.
+#[test]
+fn a_fraction_is_set_as_near_as_it_travels() {
+    let mut line = mixed(IntegerEncoding::Bytewise);
+    line.parameters.refresh_for(line.now, ID);
+    line.run_for(2_000);
+    line.sent.clear();
+    line.parameters.set(line.now, ID_8, &[("RATE", 0.1)]);
+    line.run_for(5_000);
+
+    assert_eq!(line.sets(), [(2_000, 0.1, REAL32)]);
+    assert_eq!(results(&line)[1..], [(ID_8, Ok(()))]);
+}
+
 /// One of which the type is not known is not guessed: all are read first, and it is set then.
 #[test]
 fn an_unknown_one_is_read_before_it_is_set() {

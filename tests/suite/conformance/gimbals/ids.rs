@@ -1,5 +1,6 @@
 //! Who is a gimbal by its id and its link, and which manager and name it is given (protocol notes 1.7, 4.1, 4.6).
 
+use gimbald::bridge::Input;
 use gimbald::bridge::settings::Settings;
 use gimbald::gimbals::settings::GimbalSettings;
 use gimbald::wire::MavId;
@@ -188,4 +189,20 @@ fn d1_a_lost_gimbal_has_no_successor_on_another_line() {
     rig.world.forget();
     rig.speak_for(SECOND, &[(rig.peer, SECOND_GIMBAL)]);
     assert_eq!(rig.states(), [(191, 5), (192, 4)], "it is missed");
+}
+
+/// "Then one POWEROFF heartbeat" of each manager that there was: one that waits for a gimbal that never came never beat, and
+/// says no goodbye.
+#[test]
+fn a_manager_that_never_spoke_says_no_goodbye() {
+    let entries = [154, 171].map(|component| GimbalSettings {
+        component_id: Some(component),
+        ..GimbalSettings::found(format!("camera-{component}"))
+    });
+    let mut rig = Rig::new(Settings { gimbals: entries.to_vec(), ..three_links() });
+    rig.introduce(rig.gimbals, GIMBAL);
+    rig.speak_for(2 * SECOND, &[(rig.gimbals, GIMBAL)]);
+    rig.world.forget();
+    rig.world.input(Input::Shutdown);
+    assert_eq!(rig.states(), [(191, 7)]);
 }

@@ -95,6 +95,27 @@ fn http_holds_control_as_everybody_does() {
     assert_eq!(told_control(&world.take(places.ground)), Some((NOBODY, NOBODY)));
 }
 
+/// D5: "one gate": as secondary HTTP says nothing of places and of what the gimbal does while the primary is active, as
+/// everybody, and gives that place up when it releases.
+#[test]
+fn http_as_secondary_has_the_voice_of_a_secondary() {
+    let (mut world, places) = with_gimbal();
+    assert_eq!(world.result_of(places.ground, GCS, &configure([255.0, 190.0], [1.0, 191.0])), Some(ACCEPTED));
+    assert_eq!(world.result_of(places.ground, GCS, &pitchyaw(-10.0, 0.0, NAN, NAN, 44.0)), Some(ACCEPTED));
+    fly(&mut world, places, FIELD, 0.0);
+    let place = Asked::LookAt { latitude_deg: 47.5, longitude_deg: 8.5, altitude_m: 400.0, datum: Datum::MeanSeaLevel };
+    let told = world.snapshot().gimbals[0].setpoint.clone();
+    for asked in [place, Asked::EndRoi, Asked::Stop, Asked::Operation(Operation::Reset(ResetMode::Yaw))] {
+        assert_eq!(ask(&mut world, &asked), denied("primary_is_active", Some(GCS)), "{asked:?}");
+    }
+    assert_eq!(world.snapshot().gimbals[0].setpoint, told);
+
+    assert_eq!(world.snapshot().gimbals[0].secondary.as_deref(), Some("http"));
+    assert_eq!(ask(&mut world, &Asked::ReleaseControl), Ok(()));
+    let gimbal = &world.snapshot().gimbals[0];
+    assert_eq!((gimbal.primary.as_deref(), gimbal.secondary.as_deref()), (Some("255/190"), None));
+}
+
 /// "`setpoint`: what it is told": its roll as well, an angle (level unless somebody asks for another) or a rate, where one is
 /// demanded.
 #[test]

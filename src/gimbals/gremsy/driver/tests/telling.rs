@@ -87,6 +87,27 @@ fn statements_21_and_22_what_it_measures_is_shown() {
     }
 }
 
+/// Gimbal statement 21: "Raw encoder 16384 with MAV_TS_ENCNT=1 decodes to 90.00°": what was told in another unit than the
+/// gimbal has by now is not shown as if it were in that.
+#[test]
+fn statement_21_encoders_told_in_the_former_unit_are_not_shown() {
+    let mut driver = driver(Generation::V1);
+    hear(&mut driver, Timestamp::ZERO, &heartbeat());
+    tell_parameter(&mut driver, Timestamp::ZERO, "STIFF_TILT", 20);
+    tell_parameter(&mut driver, Timestamp::ZERO, "MAV_TS_ENCNT", 1);
+    let (pointing_a, pointing_b, pointing_c) = (16_384, 0, -9_000);
+    let encoders =
+        MOUNT_STATUS_DATA { pointing_a, pointing_b, pointing_c, target_system: 0, target_component: 0, mount_mode: 2 };
+    hear(&mut driver, Timestamp::ZERO, &encoders);
+    assert!(driver.details(Timestamp::ZERO).encoders.is_some());
+
+    tell_parameter(&mut driver, Timestamp::ZERO, "MAV_TS_ENCNT", 0);
+    assert_eq!(driver.details(Timestamp::ZERO).encoders, None);
+    hear(&mut driver, Timestamp::ZERO, &encoders);
+    let pan_deg = driver.details(Timestamp::ZERO).encoders.map(|encoders| encoders.pan_deg);
+    assert!(pan_deg.is_some_and(|pan_deg| (pan_deg + 90.0).abs() < 1e-9), "{pan_deg:?}");
+}
+
 /// Gimbal statement 23: "with y=8, z=7 the type byte is taken from VERSION_Z."
 #[test]
 fn statement_23_the_stage_of_older_firmware_is_a_parameter() {
