@@ -10,6 +10,7 @@ use crate::wire::dialect::{
 use crate::wire::ids::{GimbalFlags, mav_state};
 use crate::wire::{DatagramFrames, encode_to_vec};
 
+mod operating;
 mod telling;
 
 const GIMBAL: MavId = MavId::new(1, 154);
