@@ -13,11 +13,15 @@ const EVERY: Duration = Duration::from_millis(100);
 const EVERY_UNHEARD: Duration = Duration::from_secs(1);
 const LASTS: Duration = Duration::from_secs(1);
 
-/// How it turns is taken from where it looked so long before …
+/// How it turns is taken from where it looked so long before, longer where it was told to turn slowly …
 const TURNS_WITHIN: Duration = Duration::from_millis(250);
-/// … and it turns on when that is so much of what it was told, and not slower than it may creep at rest, degrees per second.
+const SLOWLY_WITHIN: Duration = Duration::from_millis(800);
+const SLOWLY_DPS: f64 = 4.0;
+/// … and it turns on when that is so much of what it was told, or so many degrees per second where its own speed allows no
+/// more, and not less than it may creep at rest.
 const TURNS_ON: f64 = 0.5;
-const CREEPS_DPS: f64 = 1.0;
+const TURNS_ON_DPS: f64 = 2.0;
+const CREEPS_DPS: f64 = 0.1;
 /// What seems to turn for longer, although it is told to stop, may do so for another reason, such as its vehicle.
 const MAY_TURN_ON_FOR: Duration = Duration::from_secs(10);
 
@@ -27,6 +31,7 @@ const JUDGED_OVER: Duration = Duration::from_secs(8);
 /// Where it looks.
 #[derive(Clone, Copy, Debug)]
 pub struct Look {
+    pub roll: Angle,
     pub pitch: Angle,
     pub yaw: Yaw,
     /// The vehicle's heading, where it is known.
@@ -125,7 +130,7 @@ impl Stopping {
             return;
         };
         let passed = now.since(at);
-        if passed < TURNS_WITHIN {
+        if passed < self.looks_apart() {
             return;
         }
         self.looked = Some((now, look));
@@ -134,17 +139,29 @@ impl Stopping {
         self.turned.add(from_nose, over_ground);
         self.judge(now);
         let pitched = (look.pitch - before.pitch).degrees();
+        let rolled = (look.roll - before.roll).wrapped().degrees();
         let yawed = match self.turning.yaw_frame {
             YawFrame::Vehicle => from_nose.or(over_ground),
             YawFrame::Earth => over_ground.or(from_nose),
         };
-        // Pitch is over ground, and no vehicle turns it.
+        // Pitch and roll are over ground, and no vehicle turns them.
         let turns_on = as_told(self.turning.pitch, pitched, passed)
+            || self.turning.roll.is_some_and(|told| as_told(told, rolled, passed))
             || yawed.is_some_and(|yawed| as_told(self.turning.yaw, yawed, passed))
                 && (self.turns_by_itself || now.since(self.begun) < MAY_TURN_ON_FOR);
         if turns_on {
             self.heard = HeardTime::new(now);
         }
+    }
+
+    /// Noise is to come to less than a slow rotation does.
+    fn looks_apart(&self) -> Duration {
+        let told = [self.turning.roll.unwrap_or(AngularRate::ZERO), self.turning.pitch, self.turning.yaw];
+        let is_slow = told.into_iter().any(|rate| {
+            let rate = rate.degrees_per_second().abs();
+            rate > 0.0 && rate < SLOWLY_DPS
+        });
+        if is_slow { SLOWLY_WITHIN } else { TURNS_WITHIN }
     }
 
     fn judge(&mut self, now: Timestamp) {
@@ -177,7 +194,8 @@ impl Stopping {
 /// Whether what turned by so many degrees in a time turns as it was told.
 fn as_told(told: AngularRate, turned: f64, passed: Duration) -> bool {
     let told = told.degrees_per_second();
-    told != 0.0 && turned / passed.as_secs_f64() * told.signum() >= CREEPS_DPS.max(told.abs() * TURNS_ON)
+    let least = (told.abs() * TURNS_ON).clamp(CREEPS_DPS, TURNS_ON_DPS);
+    told != 0.0 && turned / passed.as_secs_f64() * told.signum() >= least
 }
 
 #[cfg(test)]
@@ -193,7 +211,10 @@ mod tests {
             stopping.handle_timeout(now, true);
             stopping.handle_heard(now);
             let yaw = Angle::from_degrees(yaw_at(*millis as f64 / 1000.0));
-            stopping.handle_report(now, Look { pitch: Angle::ZERO, yaw: Yaw::InVehicleFrame(yaw), heading: None });
+            stopping.handle_report(
+                now,
+                Look { roll: Angle::ZERO, pitch: Angle::ZERO, yaw: Yaw::InVehicleFrame(yaw), heading: None },
+            );
             stopping.is_over()
         })
     }
@@ -215,7 +236,7 @@ mod tests {
                 YawFrame::Earth => Yaw::InEarthFrame(Angle::from_degrees(turned).wrapped()),
                 YawFrame::Vehicle => Yaw::InVehicleFrame(Angle::from_degrees(turned - vehicle_dps * seconds).wrapped()),
             };
-            stopping.handle_report(now, Look { pitch: Angle::ZERO, yaw, heading: Some(heading) });
+            stopping.handle_report(now, Look { roll: Angle::ZERO, pitch: Angle::ZERO, yaw, heading: Some(heading) });
             stopping.is_over()
         })
     }
@@ -230,13 +251,34 @@ mod tests {
         assert!(stopped_after(5.0, turns_on).is_some_and(|millis| (3_900..=4_200).contains(&millis)));
         assert!(stopped_after(-5.0, |seconds| -turns_on(seconds)).is_some_and(|millis| millis >= 3_900));
         assert_eq!(stopped_after(-5.0, turns_on), Some(1_000), "that is no rotation that it was told");
-        assert_eq!(stopped_after(0.5, |seconds| 0.5 * seconds), Some(1_000), "it creeps");
+        // Slower than it was told: that is all it can.
+        assert!(stopped_after(60.0, |seconds| 4.0 * seconds.min(3.0)).is_some_and(|millis| millis >= 3_900));
+        let slowly = |seconds: f64| 0.5 * seconds.min(4.0);
+        assert!(stopped_after(0.5, slowly).is_some_and(|millis| (4_000..=5_200).contains(&millis)));
+        assert_eq!(stopped_after(0.5, |seconds| 0.1 * seconds), Some(1_000), "it creeps");
     }
 
     /// Nothing waits for ever for one that is turned by something else.
     #[test]
     fn what_turns_on_for_long_is_not_waited_for() {
         assert!(stopped_after(5.0, |seconds| 5.0 * seconds).is_some_and(|millis| (10_700..=11_200).contains(&millis)));
+    }
+
+    /// Roll turns on like the others, and no vehicle does that.
+    #[test]
+    fn a_roll_that_turns_on_is_told_to_stop_until_it_does() {
+        let told = AngularRate::from_degrees_per_second(-5.0);
+        let mut stopping = Stopping::new(Timestamp::ZERO, Turning { roll: Some(told), ..Turning::STOPPED });
+        let over = (50..=60_000_u64).step_by(50).find(|millis| {
+            let (now, seconds) = (Timestamp::from_millis(*millis), *millis as f64 / 1000.0);
+            stopping.handle_timeout(now, true);
+            stopping.handle_heard(now);
+            let roll = Angle::from_degrees(-5.0 * seconds.min(20.0));
+            let yaw = Yaw::InVehicleFrame(Angle::ZERO);
+            stopping.handle_report(now, Look { roll, pitch: Angle::ZERO, yaw, heading: None });
+            stopping.is_over()
+        });
+        assert!(over.is_some_and(|millis| (20_700..=21_300).contains(&millis)), "{over:?}");
     }
 
     /// Where it is known how the vehicle turns, a rotation is told from one of the vehicle, and is stopped however long

@@ -49,13 +49,14 @@ impl GremsyDriver {
         }
     }
 
-    /// It does what it was told, and nothing that it was told before holds.
+    /// It does what it was told, and nothing that it was told before holds; but for a rotation: a line that is out looks the
+    /// same, and so it is over when the gimbal is stopped or tells that it starts.
     pub(super) fn switch_off(&mut self, now: Timestamp, comes_back: bool) {
         self.off = Some(Off { since: now, comes_back });
         self.hand_over = HandOver::No;
         self.mount.handle_lost();
         self.end_moves();
-        self.forget_rotation();
+        self.stop_v2(now);
         self.effect.forget();
     }
 

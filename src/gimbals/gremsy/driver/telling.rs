@@ -103,7 +103,8 @@ impl GremsyDriver {
         let pose = Pose { pitch: status.attitude.angles().pitch, yaw: status.attitude.yaw() };
         if let Some(stopping) = &mut self.stopping {
             let heading = self.vehicle_heading;
-            stopping.handle_report(now, Look { pitch: pose.pitch, yaw: pose.yaw, heading });
+            let roll = status.attitude.angles().roll;
+            stopping.handle_report(now, Look { roll, pitch: pose.pitch, yaw: pose.yaw, heading });
         }
         let limits = FailureFlags::AT_PITCH_LIMIT | FailureFlags::AT_YAW_LIMIT | FailureFlags::AT_ROLL_LIMIT;
         let motors_off = self.heard.status.is_some_and(|(_, status)| !status.motors_on());

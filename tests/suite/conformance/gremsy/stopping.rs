@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use gimbald::geometry::AngularRate;
 use gimbald::gimbals::gremsy::packet;
-use gimbald::gimbals::operation::{OperationError, YawMode};
+use gimbald::gimbals::operation::{OperationError, Restart, YawMode};
 use gimbald::manager::asked::NotDone;
 use gimbald::wire::dialect::{COMMAND_ACK_DATA, MavMessage, MessageData};
 
@@ -22,10 +22,15 @@ struct Deaf {
     command: Rc<Cell<Option<u16>>>,
     /// So many setpoints of either generation.
     setpoints: Rc<Cell<u32>>,
+    /// Anything, nor is it heard.
+    everything: Rc<Cell<bool>>,
 }
 
 impl Interceptor for Deaf {
     fn towards_peer(&mut self, bytes: &[u8]) -> Passage {
+        if self.everything.get() {
+            return Passage::Lost;
+        }
         let id = u32::from_le_bytes([bytes[7], bytes[8], bytes[9], 0]);
         let number = (id == COMMAND_LONG_DATA::ID).then(|| u16::from_le_bytes([bytes[38], bytes[39]]));
         let is_setpoint = number == Some(command::DO_MOUNT_CONTROL) || id == GIMBAL_DEVICE_SET_ATTITUDE_DATA::ID;
@@ -34,6 +39,10 @@ impl Interceptor for Deaf {
             return Passage::Lost;
         }
         if number.is_some() && number == self.command.get() { Passage::Lost } else { Passage::Through }
+    }
+
+    fn towards_core(&mut self, _bytes: &[u8]) -> Passage {
+        if self.everything.get() { Passage::Lost } else { Passage::Through }
     }
 }
 
@@ -133,6 +142,31 @@ fn one_that_hears_nothing_for_long_stands_when_it_hears_again() {
         deaf.setpoints.set(0);
         run(&mut world, places, 6 * SECOND);
         assert_rests(&mut world, places);
+    }
+}
+
+/// A line that is out in both directions looks like a restart to who asked for one: the gimbal is stopped when it is back,
+/// unless it tells that it starts.
+#[test]
+fn one_that_only_seems_to_have_started_again_is_stopped() {
+    for generation in [Generation::V1, Generation::V2] {
+        for restart in [Restart::Reboot, Restart::Shutdown] {
+            let (mut world, places, deaf) = turning_by_name(generation);
+            let before = looks(&world).1;
+            deaf.everything.set(true);
+            let done = operate(&mut world, places, Operation::Restart(restart));
+            assert_eq!(done, Some(Ok(())), "{generation:?} {restart:?}");
+            assert_eq!(world.stored_turning, ["camera\t1/154\tgremsy"], "{generation:?} {restart:?}");
+            deaf.everything.set(false);
+            run(&mut world, places, 4 * SECOND);
+            assert!(
+                (looks(&world).1 - before).rem_euclid(360.0) > 20.0,
+                "it has turned on: {before} {:?}",
+                looks(&world)
+            );
+            assert_rests(&mut world, places);
+            assert_eq!(world.stored_turning, [""; 0], "{generation:?} {restart:?}");
+        }
     }
 }
 
