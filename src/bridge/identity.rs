@@ -26,6 +26,8 @@ const GONE_FOR_GOOD: Duration = Duration::from_secs(30);
 pub struct Ties {
     /// A client is in control, and nothing may change under it.
     pub is_held: bool,
+    /// A gimbal that is there may be turning, and may hear that it is to stop under the id alone that told it to turn.
+    pub is_turning: bool,
     /// Another vehicle has the fallback id.
     pub fallback_is_taken: bool,
 }
@@ -148,7 +150,7 @@ impl Identity {
                     self.settle(FALLBACK_SYSTEM_ID, true);
                 }
             }
-            Some(ours) if !ties.is_held || self.is_orphaned(now) => {
+            Some(ours) if !ties.is_turning && (!ties.is_held || self.is_orphaned(now)) => {
                 // Another id only when its autopilot alone has been heard for the whole window.
                 let other = self.autopilots.iter().find(|(id, first, latest)| {
                     Some(*id) == only && now.since(*first) >= WINDOW && now.since(*latest) < AUTOPILOT_LOST
@@ -174,7 +176,7 @@ impl Identity {
 mod tests {
     use super::*;
 
-    const FREE: Ties = Ties { is_held: false, fallback_is_taken: false };
+    const FREE: Ties = Ties { is_held: false, is_turning: false, fallback_is_taken: false };
     const HELD: Ties = Ties { is_held: true, ..FREE };
 
     /// Protocol checklist 15: "exactly one autopilot system (say 7) beats for 3 s": its id is ours.
@@ -231,6 +233,7 @@ mod tests {
             assert!(!identity.has_several(secs(second)), "it is one that was restarted");
         }
         identity.handle_autopilot(secs(35), 8);
+        assert!(!identity.update(secs(35), Ties { is_turning: true, ..HELD }));
         assert!(identity.update(secs(35), HELD));
         assert_eq!(identity.system(), Some(8));
     }

@@ -63,7 +63,7 @@ pub struct Renamed {
 }
 
 impl Gimbal {
-    pub(super) fn is_lost(&self) -> bool {
+    pub(in crate::bridge) fn is_lost(&self) -> bool {
         self.manager.state() == DeviceState::Lost
     }
 

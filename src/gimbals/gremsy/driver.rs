@@ -99,7 +99,9 @@ pub struct GremsyDriver {
     is_retracted: bool,
     /// How it was last told to turn in v2.
     turning: Option<Turning>,
-    /// In v2, or before it is known which it is, a rotation that is being stopped.
+    /// In v1, how it is told to turn.
+    turning_in_v1: Option<Turning>,
+    /// A rotation that is being stopped; in v1 it is only watched here.
     stopping: Option<Stopping>,
     /// In v2, it is handed to its radio control when it has stopped.
     hand_over_waits: bool,
@@ -188,6 +190,7 @@ impl GremsyDriver {
             motors_asked: None,
             is_retracted: false,
             turning: None,
+            turning_in_v1: None,
             stopping: None,
             hand_over_waits: false,
             readiness: None,

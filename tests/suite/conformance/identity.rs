@@ -12,7 +12,7 @@ use gimbald::wire::dialect::{
 
 use crate::support::script::{
     ACCEPTED, DENIED, NAN, command_long, device_information, gimbal_heartbeat, ground_heartbeat, of, pitchyaw,
-    px4_heartbeat, request_message, set_pitchyaw, take_control, usual_capabilities,
+    px4_heartbeat, request_message, set_manual_control, set_pitchyaw, take_control, usual_capabilities,
 };
 use crate::support::world::{
     AUTOPILOT, Arrival, GCS, GIMBAL, MANAGER, Place, Places, World, heartbeat, link, three_links,
@@ -412,6 +412,33 @@ fn item_15_a_changed_system_id_waits_until_nobody_is_in_control() {
     world.run_with(Duration::from_secs(12), &[gimbal, changed]);
     assert_eq!((world.snapshot().system_id, world.stored_system_ids.clone()), (Some(7), vec![7]));
     assert_eq!(world.snapshot().gimbals[0].primary, None);
+}
+
+/// "A gimbal that turns after its operator is gone is our worst bug": one that hears its system alone is told to stop under the
+/// id that told it to turn, before we take another.
+#[test]
+fn item_15_a_changed_system_id_waits_until_a_gimbal_has_stopped() {
+    use gimbald::gimbals::gremsy::sim::{Device, DeviceSettings, Generation};
+    for generation in [Generation::V1, Generation::V2] {
+        let (mut world, places) = World::empty(Settings { stored_system_id: Some(1), ..auto() });
+        world.install(places.gimbal, Device::new(world.now, DeviceSettings::of(generation)));
+        let former = (SECOND, places.autopilot, AUTOPILOT, px4_heartbeat());
+        let changed = (SECOND, places.autopilot, MavId::new(7, 1), px4_heartbeat());
+        let stick = (SECOND / 5, places.ground, GCS, set_manual_control(NAN, NAN, 0.0, 0.2));
+        world.run_with(25 * SECOND, std::slice::from_ref(&former));
+        world.run_with(3 * SECOND, &[former, stick.clone()]);
+        world.run_with(6 * SECOND, &[changed.clone(), stick]);
+        let looks = |world: &World| world.snapshot().gimbals[0].attitude.yaw_vehicle_deg.expect("it is told");
+        let before = looks(&world);
+        assert!(before > 30.0, "{generation:?}: it turns: {before}");
+        assert_eq!(world.snapshot().system_id, Some(1), "{generation:?}");
+        // Its operator is gone.
+        world.run_with(8 * SECOND, std::slice::from_ref(&changed));
+        assert_eq!(world.snapshot().system_id, Some(7), "{generation:?}");
+        let stopped = looks(&world);
+        world.run_with(5 * SECOND, &[changed]);
+        assert!((looks(&world) - stopped).abs() < 0.5, "{generation:?}: it turns on: {stopped} {}", looks(&world));
+    }
 }
 
 const HEARTBEAT: u32 = 0;

@@ -61,6 +61,8 @@ pub struct Condition {
     /// It looks where it was told to.
     pub is_there: bool,
     pub motors_on: bool,
+    /// Whether it has stopped turning is being watched, beyond its answers.
+    pub is_watched: bool,
 }
 
 /// What is to be sent.
@@ -280,7 +282,7 @@ impl Mount {
             self.wanted = None;
             self.sent = None;
         }
-        if !self.is_sayable(condition) && self.may_be_turning() {
+        if !self.is_sayable(condition) && (self.may_be_turning() || condition.is_watched) {
             self.stop_when_due(now, device, condition);
             return;
         }
@@ -304,7 +306,7 @@ impl Mount {
 
     /// When [`advance`](Self::advance) is due. `None` while it waits for the gimbal.
     pub fn poll_timeout(&self, condition: Condition) -> Option<Timestamp> {
-        let stops = self.may_be_turning() && !self.is_sayable(condition);
+        let stops = (self.may_be_turning() || condition.is_watched) && !self.is_sayable(condition);
         let stop = stops.then(|| self.stop_due(condition));
         let Some(wanted) = self.wanted else { return stop };
         let dead_man = Some(self.refreshed + if wanted.turns() { DEAD_MAN } else { LET_GO });
@@ -357,7 +359,7 @@ impl Mount {
 
     /// Zeros for a gimbal that may be turning while something else is wanted, or nothing.
     fn stop_when_due(&mut self, now: Timestamp, device: MavId, condition: Condition) {
-        if self.may_be_turning() && self.stop_due(condition) <= now {
+        if (self.may_be_turning() || condition.is_watched) && self.stop_due(condition) <= now {
             self.say(now, device, Order::Turn { rates: [AngularRate::ZERO; 3], mode: YawMode::Follow });
         }
     }

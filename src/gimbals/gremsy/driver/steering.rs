@@ -174,7 +174,8 @@ impl GremsyDriver {
     pub(super) fn stop_v2(&mut self, now: Timestamp) {
         if let Some(turning) = self.turning.take() {
             self.stopping = Some(Stopping::new(now, turning));
-        } else if let Some(stopping) = &mut self.stopping {
+        } else if let Some(stopping) = self.stopping.as_mut().filter(|_| self.search.decided() != Some(Generation::V1))
+        {
             stopping.go_on(now);
         }
     }
@@ -192,6 +193,21 @@ impl GremsyDriver {
             self.hand_over_waits = false;
             self.hand_over = HandOver::Asked;
             self.outputs.push_back(DriverOutput::Command(Box::new(packet::hand_to_rc(device))));
+        }
+    }
+
+    /// In v1, whether what took the place of a rotation was heard is told by its answer, and seen as well.
+    fn watch_rotation_in_v1(&mut self, now: Timestamp) {
+        let turning = match self.mount.wanted() {
+            Some(order @ Order::Turn { rates: [roll, pitch, yaw], .. }) if order.turns() => {
+                Some(Turning { roll: Some(roll), pitch, yaw, yaw_frame: YawFrame::Earth, ..Turning::STOPPED })
+            }
+            _ => None,
+        };
+        match (turning, std::mem::replace(&mut self.turning_in_v1, turning)) {
+            (Some(_), _) => self.stopping = None,
+            (None, Some(before)) => self.stopping = Some(Stopping::watching(now, before)),
+            (None, None) => {}
         }
     }
 
@@ -295,6 +311,7 @@ impl GremsyDriver {
         self.stop_on_in_v2(now, device);
         if self.search.decided() != Some(Generation::V2) {
             self.mount.advance(now, device, self.condition());
+            self.watch_rotation_in_v1(now);
         }
         self.drain_mount(now);
     }
@@ -333,6 +350,7 @@ impl GremsyDriver {
             is_ready: self.is_alive && self.is_present && self.is_active && self.off.is_none(),
             is_there: self.is_there(),
             motors_on: self.heard.status.is_some_and(|(_, status)| status.motors_on()),
+            is_watched: self.stopping.is_some() && self.search.decided() == Some(Generation::V1),
         }
     }
 

@@ -1,5 +1,6 @@
 //! Stopping a Gremsy that speaks v2, which answers no setpoint: zeros for a second in which it is heard, and does not tell
-//! that it turns on. What it says may arrive while what it is told does not.
+//! that it turns on. What it says may arrive while what it is told does not. One that speaks v1 acknowledges its zeros, which
+//! are sent elsewhere; a copy of an older answer looks the same, so it is watched here as well.
 
 use std::time::Duration;
 
@@ -22,6 +23,8 @@ const SLOWLY_DPS: f64 = 4.0;
 const TURNS_ON: f64 = 0.5;
 const TURNS_ON_DPS: f64 = 2.0;
 const CREEPS_DPS: f64 = 0.1;
+/// One that rests does so from the nose or over ground, but for this.
+const RESTS_DPS: f64 = 0.5;
 /// What seems to turn for longer, although it is told to stop, may do so for another reason, such as its vehicle.
 const MAY_TURN_ON_FOR: Duration = Duration::from_secs(10);
 
@@ -74,6 +77,8 @@ pub struct Stopping {
     turning: Turning,
     /// It is told something else than zeros, which stops it as well.
     is_replaced: bool,
+    /// It answers as well, so only what is certain counts.
+    answers: bool,
     next: Timestamp,
     heard: HeardTime,
     begun: Timestamp,
@@ -90,6 +95,7 @@ impl Stopping {
         Self {
             turning,
             is_replaced: false,
+            answers: false,
             next: now,
             heard: HeardTime::new(now),
             begun: now,
@@ -97,6 +103,11 @@ impl Stopping {
             turned: Turned::new(now),
             turns_by_itself: false,
         }
+    }
+
+    /// One that answers what it is told, and is told to stop elsewhere.
+    pub fn watching(now: Timestamp, turning: Turning) -> Self {
+        Self { is_replaced: true, answers: true, ..Self::new(now, turning) }
     }
 
     /// Something else is told it in the place of its rotation, again and again.
@@ -122,16 +133,16 @@ impl Stopping {
         self.next = self.next.min(now + EVERY);
     }
 
-    /// It tells where it looks.
-    pub fn handle_report(&mut self, now: Timestamp, look: Look) {
+    /// It tells where it looks; true where it tells that it turns on.
+    pub fn handle_report(&mut self, now: Timestamp, look: Look) -> bool {
         let Some((at, before)) = self.looked.filter(|(_, before)| before.yaw.frame() == look.yaw.frame()) else {
             self.looked = Some((now, look));
             self.turned = Turned::new(now);
-            return;
+            return false;
         };
         let passed = now.since(at);
         if passed < self.looks_apart() {
-            return;
+            return false;
         }
         self.looked = Some((now, look));
         let turned = |frame| Some((look.yaw_in(frame)? - before.yaw_in(frame)?).wrapped().degrees());
@@ -148,10 +159,16 @@ impl Stopping {
         let turns_on = as_told(self.turning.pitch, pitched, passed)
             || self.turning.roll.is_some_and(|told| as_told(told, rolled, passed))
             || yawed.is_some_and(|yawed| as_told(self.turning.yaw, yawed, passed))
-                && (self.turns_by_itself || now.since(self.begun) < MAY_TURN_ON_FOR);
+                && match self.answers {
+                    true => [from_nose, over_ground]
+                        .into_iter()
+                        .all(|yawed| yawed.is_some_and(|yawed| moves(yawed, passed))),
+                    false => self.turns_by_itself || now.since(self.begun) < MAY_TURN_ON_FOR,
+                };
         if turns_on {
             self.heard = HeardTime::new(now);
         }
+        turns_on
     }
 
     /// Noise is to come to less than a slow rotation does.
@@ -189,6 +206,11 @@ impl Stopping {
     pub fn poll_timeout(&self) -> Option<Timestamp> {
         Some(self.next).filter(|_| !self.is_replaced)
     }
+}
+
+/// Whether what turned by so many degrees in a time moves.
+fn moves(turned: f64, passed: Duration) -> bool {
+    turned.abs() / passed.as_secs_f64() >= RESTS_DPS
 }
 
 /// Whether what turned by so many degrees in a time turns as it was told.

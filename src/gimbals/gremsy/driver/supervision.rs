@@ -79,7 +79,7 @@ impl GremsyDriver {
     /// It has started again, and nothing of before turns it.
     pub(super) fn forget_rotation(&mut self) {
         self.mount.forget_rotation();
-        (self.turning, self.stopping) = (None, None);
+        (self.turning, self.turning_in_v1, self.stopping) = (None, None, None);
     }
 
     pub(super) fn handle_heard(&mut self, now: Timestamp, device: MavId) {

@@ -102,9 +102,14 @@ impl GremsyDriver {
         self.outputs.push_back(DriverOutput::Report(Report::Attitude(status)));
         let pose = Pose { pitch: status.attitude.angles().pitch, yaw: status.attitude.yaw() };
         if let Some(stopping) = &mut self.stopping {
-            let heading = self.vehicle_heading;
+            let is_v1 = self.search.decided() == Some(Generation::V1);
+            let own = self.heard.orientation.and_then(|(_, told)| Some(told.yaw_absolute? - told.yaw));
+            let heading = if is_v1 { own } else { self.vehicle_heading };
             let roll = status.attitude.angles().roll;
-            stopping.handle_report(now, Look { roll, pitch: pose.pitch, yaw: pose.yaw, heading });
+            let turns_on = stopping.handle_report(now, Look { roll, pitch: pose.pitch, yaw: pose.yaw, heading });
+            if turns_on && is_v1 {
+                self.mount.assume_turning();
+            }
         }
         let limits = FailureFlags::AT_PITCH_LIMIT | FailureFlags::AT_YAW_LIMIT | FailureFlags::AT_ROLL_LIMIT;
         let motors_off = self.heard.status.is_some_and(|(_, status)| !status.motors_on());

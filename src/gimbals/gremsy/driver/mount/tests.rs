@@ -6,7 +6,8 @@ const ACCEPTED: CommandOutcome = CommandOutcome::Answered(CommandResult::Accepte
 const DENIED: CommandOutcome = CommandOutcome::Answered(CommandResult::Denied as u8);
 
 const GIMBAL: MavId = MavId::new(1, 154);
-const READY: Condition = Condition { is_heard: true, is_ready: true, is_there: false, motors_on: true };
+const READY: Condition =
+    Condition { is_heard: true, is_ready: true, is_there: false, motors_on: true, is_watched: false };
 
 fn at(millis: u64) -> Timestamp {
     Timestamp::from_millis(millis)
