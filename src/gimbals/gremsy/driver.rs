@@ -18,6 +18,7 @@ mod stopping;
 mod streams;
 mod supervision;
 mod telling;
+mod told_rates;
 mod vehicle_turn;
 mod writes;
 
@@ -56,6 +57,7 @@ use operations::Operations;
 use stopping::Stopping;
 use streams::Streams;
 use supervision::Off;
+use told_rates::ToldRates;
 use vehicle_turn::VehicleTurn;
 
 /// A gimbal not heard for so long is lost: five heartbeats.
@@ -101,6 +103,7 @@ pub struct GremsyDriver {
     turning: Option<Turning>,
     /// In v1, how it is told to turn.
     turning_in_v1: Option<Turning>,
+    told_rates: ToldRates,
     /// A rotation that is being stopped; in v1 it is only watched here.
     stopping: Option<Stopping>,
     /// In v2, it is handed to its radio control when it has stopped.
@@ -191,6 +194,7 @@ impl GremsyDriver {
             is_retracted: false,
             turning: None,
             turning_in_v1: None,
+            told_rates: ToldRates::default(),
             stopping: None,
             hand_over_waits: false,
             readiness: None,

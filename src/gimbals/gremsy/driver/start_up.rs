@@ -89,7 +89,7 @@ impl GremsyDriver {
                 let speaks = generation == Generation::V2;
                 if speaks && self.mount.may_be_turning() {
                     self.mount.forget_rotation();
-                    self.stopping = Some(Stopping::new(now, Turning::STOPPED));
+                    self.stopping = Some(Stopping::new(now, Turning::STOPPED, self.told_rates));
                 } else if !speaks {
                     self.stopping = None;
                 }

@@ -6,6 +6,7 @@ use super::mode_change::{self, ModeChange};
 use super::mount::{Condition, DEAD_MAN, MountOutput, Order};
 use super::operations::MOTORS_SHOW_WITHIN;
 use super::stopping::Stopping;
+use super::told_rates::ToldRates;
 use super::{Generation, GremsyDriver, HandOver, Timer};
 use crate::geometry::{Angle, AngularRate, GimbalAngles, Yaw, YawFrame};
 use crate::gimbals::driver::{DriverOutput, GimbalDriver};
@@ -51,7 +52,7 @@ impl GremsyDriver {
             // To stop takes no knowledge: zeros in either protocol.
             None if is_stop => {
                 self.mount.assume_turning();
-                self.stopping.get_or_insert(Stopping::new(now, Turning::STOPPED));
+                self.stopping.get_or_insert(Stopping::new(now, Turning::STOPPED, self.told_rates));
             }
             None => {}
         }
@@ -150,6 +151,7 @@ impl GremsyDriver {
         match setpoint {
             Setpoint::Turn(turning) if !turning.is_zero() => {
                 self.turning = Some(turning);
+                self.told_rates.add(turning);
                 self.stopping = None;
                 self.timers.set(Timer::DeadMan, now + DEAD_MAN);
             }
@@ -173,7 +175,7 @@ impl GremsyDriver {
     /// Begins to stop what it was told to turn in v2.
     pub(super) fn stop_v2(&mut self, now: Timestamp) {
         if let Some(turning) = self.turning.take() {
-            self.stopping = Some(Stopping::new(now, turning));
+            self.stopping = Some(Stopping::new(now, turning, self.told_rates));
         } else if let Some(stopping) = self.stopping.as_mut().filter(|_| self.search.decided() != Some(Generation::V1))
         {
             stopping.go_on(now);
@@ -184,6 +186,7 @@ impl GremsyDriver {
         if let Some(stopping) = &mut self.stopping {
             if stopping.is_over() {
                 self.stopping = None;
+                self.told_rates = ToldRates::default();
             } else if let Some(zero) = stopping.handle_timeout(now, self.is_alive) {
                 self.v2.handle_setpoint(now, zero);
             }
@@ -205,8 +208,11 @@ impl GremsyDriver {
             _ => None,
         };
         match (turning, std::mem::replace(&mut self.turning_in_v1, turning)) {
-            (Some(_), _) => self.stopping = None,
-            (None, Some(before)) => self.stopping = Some(Stopping::watching(now, before)),
+            (Some(turning), _) => {
+                self.told_rates.add(turning);
+                self.stopping = None;
+            }
+            (None, Some(before)) => self.stopping = Some(Stopping::watching(now, before, self.told_rates)),
             (None, None) => {}
         }
     }

@@ -4,7 +4,8 @@
 
 use std::time::Duration;
 
-use crate::geometry::{Angle, AngularRate, Yaw, YawFrame};
+use super::told_rates::ToldRates;
+use crate::geometry::{Angle, Yaw, YawFrame};
 use crate::gimbals::heard_time::HeardTime;
 use crate::gimbals::setpoint::{Setpoint, Turning};
 use crate::timestamp::Timestamp;
@@ -14,15 +15,6 @@ const EVERY: Duration = Duration::from_millis(100);
 const EVERY_UNHEARD: Duration = Duration::from_secs(1);
 const LASTS: Duration = Duration::from_secs(1);
 
-/// How it turns is taken from where it looked so long before, longer where it was told to turn slowly …
-const TURNS_WITHIN: Duration = Duration::from_millis(250);
-const SLOWLY_WITHIN: Duration = Duration::from_millis(800);
-const SLOWLY_DPS: f64 = 4.0;
-/// … and it turns on when that is so much of what it was told, or so many degrees per second where its own speed allows no
-/// more, and not less than it may creep at rest.
-const TURNS_ON: f64 = 0.5;
-const TURNS_ON_DPS: f64 = 2.0;
-const CREEPS_DPS: f64 = 0.1;
 /// One that rests does so from the nose or over ground, but for this.
 const RESTS_DPS: f64 = 0.5;
 /// What seems to turn for longer, although it is told to stop, may do so for another reason, such as its vehicle.
@@ -75,6 +67,7 @@ impl Turned {
 #[derive(Clone, Copy, Debug)]
 pub struct Stopping {
     turning: Turning,
+    told: ToldRates,
     /// It is told something else than zeros, which stops it as well.
     is_replaced: bool,
     /// It answers as well, so only what is certain counts.
@@ -91,9 +84,10 @@ pub struct Stopping {
 
 impl Stopping {
     /// The first zero is due at once.
-    pub fn new(now: Timestamp, turning: Turning) -> Self {
+    pub fn new(now: Timestamp, turning: Turning, told: ToldRates) -> Self {
         Self {
             turning,
+            told,
             is_replaced: false,
             answers: false,
             next: now,
@@ -106,8 +100,8 @@ impl Stopping {
     }
 
     /// One that answers what it is told, and is told to stop elsewhere.
-    pub fn watching(now: Timestamp, turning: Turning) -> Self {
-        Self { is_replaced: true, answers: true, ..Self::new(now, turning) }
+    pub fn watching(now: Timestamp, turning: Turning, told: ToldRates) -> Self {
+        Self { is_replaced: true, answers: true, ..Self::new(now, turning, told) }
     }
 
     /// Something else is told it in the place of its rotation, again and again.
@@ -141,7 +135,7 @@ impl Stopping {
             return false;
         };
         let passed = now.since(at);
-        if passed < self.looks_apart() {
+        if passed < self.told.looks_apart() {
             return false;
         }
         self.looked = Some((now, look));
@@ -156,9 +150,9 @@ impl Stopping {
             YawFrame::Earth => over_ground.or(from_nose),
         };
         // Pitch and roll are over ground, and no vehicle turns them.
-        let turns_on = as_told(self.turning.pitch, pitched, passed)
-            || self.turning.roll.is_some_and(|told| as_told(told, rolled, passed))
-            || yawed.is_some_and(|yawed| as_told(self.turning.yaw, yawed, passed))
+        let turns_on = self.told.pitch.is_as_told(pitched, passed)
+            || self.told.roll.is_as_told(rolled, passed)
+            || yawed.is_some_and(|yawed| self.told.yaw.is_as_told(yawed, passed))
                 && match self.answers {
                     true => [from_nose, over_ground]
                         .into_iter()
@@ -171,21 +165,11 @@ impl Stopping {
         turns_on
     }
 
-    /// Noise is to come to less than a slow rotation does.
-    fn looks_apart(&self) -> Duration {
-        let told = [self.turning.roll.unwrap_or(AngularRate::ZERO), self.turning.pitch, self.turning.yaw];
-        let is_slow = told.into_iter().any(|rate| {
-            let rate = rate.degrees_per_second().abs();
-            rate > 0.0 && rate < SLOWLY_DPS
-        });
-        if is_slow { SLOWLY_WITHIN } else { TURNS_WITHIN }
-    }
-
     fn judge(&mut self, now: Timestamp) {
         let passed = now.since(self.turned.since);
         if passed >= JUDGED_OVER {
             let Turned { from_nose, over_ground, .. } = std::mem::replace(&mut self.turned, Turned::new(now));
-            let is_told = |turned: Option<f64>| turned.is_some_and(|turned| as_told(self.turning.yaw, turned, passed));
+            let is_told = |turned: Option<f64>| turned.is_some_and(|turned| self.told.yaw.is_as_told(turned, passed));
             self.turns_by_itself = is_told(from_nose) && is_told(over_ground);
         }
     }
@@ -213,21 +197,21 @@ fn moves(turned: f64, passed: Duration) -> bool {
     turned.abs() / passed.as_secs_f64() >= RESTS_DPS
 }
 
-/// Whether what turned by so many degrees in a time turns as it was told.
-fn as_told(told: AngularRate, turned: f64, passed: Duration) -> bool {
-    let told = told.degrees_per_second();
-    let least = (told.abs() * TURNS_ON).clamp(CREEPS_DPS, TURNS_ON_DPS);
-    told != 0.0 && turned / passed.as_secs_f64() * told.signum() >= least
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::AngularRate;
+
+    fn begin(turning: Turning) -> Stopping {
+        let mut told = ToldRates::default();
+        told.add(turning);
+        Stopping::new(Timestamp::ZERO, turning, told)
+    }
 
     /// When it is over, in milliseconds; reports come twenty times a second and every zero is sent.
     fn stopped_after(told_dps: f64, yaw_at: impl Fn(f64) -> f64) -> Option<u64> {
         let turning = Turning { yaw: AngularRate::from_degrees_per_second(told_dps), ..Turning::STOPPED };
-        let mut stopping = Stopping::new(Timestamp::ZERO, turning);
+        let mut stopping = begin(turning);
         (50..=20_000).step_by(50).find(|millis| {
             let now = Timestamp::from_millis(*millis);
             stopping.handle_timeout(now, true);
@@ -245,7 +229,7 @@ mod tests {
     /// whose vehicle turns.
     fn stopped_over_ground(reports: YawFrame, vehicle_dps: f64, turns_for: f64) -> Option<u64> {
         let turning = Turning { yaw: AngularRate::from_degrees_per_second(5.0), ..Turning::STOPPED };
-        let mut stopping = Stopping::new(Timestamp::ZERO, turning);
+        let mut stopping = begin(turning);
         (50..=60_000).step_by(50).find(|millis| {
             let (now, seconds) = (Timestamp::from_millis(*millis), *millis as f64 / 1000.0);
             stopping.handle_timeout(now, true);
@@ -290,7 +274,7 @@ mod tests {
     #[test]
     fn a_roll_that_turns_on_is_told_to_stop_until_it_does() {
         let told = AngularRate::from_degrees_per_second(-5.0);
-        let mut stopping = Stopping::new(Timestamp::ZERO, Turning { roll: Some(told), ..Turning::STOPPED });
+        let mut stopping = begin(Turning { roll: Some(told), ..Turning::STOPPED });
         let over = (50..=60_000_u64).step_by(50).find(|millis| {
             let (now, seconds) = (Timestamp::from_millis(*millis), *millis as f64 / 1000.0);
             stopping.handle_timeout(now, true);

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::faults::Fault;
+use super::told_rates::ToldRates;
 use super::{Generation, GremsyDriver, HandOver, Heard, LOST_AFTER, TICK, Timer, operations};
 use crate::gimbals::driver::DriverOutput;
 use crate::gimbals::gremsy::status::{Activity, SystemStatus};
@@ -80,6 +81,7 @@ impl GremsyDriver {
     pub(super) fn forget_rotation(&mut self) {
         self.mount.forget_rotation();
         (self.turning, self.turning_in_v1, self.stopping) = (None, None, None);
+        self.told_rates = ToldRates::default();
     }
 
     pub(super) fn handle_heard(&mut self, now: Timestamp, device: MavId) {

@@ -145,6 +145,26 @@ fn one_that_hears_nothing_for_long_stands_when_it_hears_again() {
     }
 }
 
+/// It turns as it was told before its line was out, whatever it was told since.
+#[test]
+fn one_that_goes_on_as_it_was_told_before_is_stopped_too() {
+    let (mut world, places, deaf) = turning_by_name(Generation::V2);
+    deaf.setpoints.set(u32::MAX);
+    for (pitch, yaw) in [(0.0, -20.0), (3.0, 0.0)] {
+        let rate = AngularRate::from_degrees_per_second;
+        let asked = Asked::Turn { roll: None, pitch: rate(pitch), yaw: rate(yaw), yaw_frame: YawFrame::Vehicle };
+        world.input(Input::Asked { id: OperationId(8), gimbal: "camera", asked: &asked });
+        run(&mut world, places, SECOND / 4);
+    }
+    let not_done = operate(&mut world, places, Operation::SetYawMode(YawMode::Follow));
+    assert_eq!(not_done, Some(Err(NotDone::Operation(OperationError::NoAnswer))));
+    assert_eq!(world.stored_turning, ["camera\t1/154\tgremsy"]);
+    deaf.setpoints.set(0);
+    run(&mut world, places, 4 * SECOND);
+    assert_rests(&mut world, places);
+    assert_eq!(world.stored_turning, [""; 0]);
+}
+
 /// "with 5 % loss, duplication": a second copy of an answer to the rate is none to the stop, which has not arrived.
 #[test]
 fn a_copy_of_an_answer_does_not_stop_it() {
