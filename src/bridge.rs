@@ -60,7 +60,7 @@ use identity::Identity;
 use outbox::Outbox;
 use presenting::Presented;
 use rivals::RivalWatch;
-use roster::Roster;
+use roster::{LeftTurning, Roster};
 use settings::{Role, Settings};
 use state_for_gimbals::StateForGimbals;
 use stations::Stations;
@@ -180,7 +180,10 @@ enum Timer {
 
 impl Bridge {
     pub fn new(now: Timestamp, settings: Settings) -> Self {
-        let identity = Identity::new(now, settings.system_id, settings.stored_system_id);
+        // A gimbal that an earlier run left turning may listen to the system alone that told it to.
+        let left_turning = || settings.left_turning.iter().find_map(|line| LeftTurning::read(line)?.device);
+        let stored = settings.stored_system_id.or_else(|| left_turning().map(|device| device.system));
+        let identity = Identity::new(now, settings.system_id, stored);
         let mut bridge = Self {
             started: now,
             channels: Channels::new(settings.links.clone()),

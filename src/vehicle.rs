@@ -156,6 +156,14 @@ impl Vehicle {
         self.attitude(now).map(Attitude::heading).or_else(compass)
     }
 
+    /// [`heading`](Self::heading) as it is now if the vehicle has turned on since it was told, which may be once a second.
+    pub fn heading_by_now(&self, now: Timestamp) -> Option<Angle> {
+        let told = self.attitude(now).and(self.attitude_age(now)).or(self.compass.map(|heading| heading.age(now)));
+        let turned =
+            self.yaw_rate(now).zip(told).map_or(0.0, |(rate, age)| rate.radians_per_second() * age.as_secs_f64());
+        Some((self.heading(now)? + Angle::from_radians(turned)).wrapped())
+    }
+
     /// What was known and is too old to act on: `heading`, `position`.
     pub fn stale(&self, now: Timestamp) -> impl Iterator<Item = &'static str> {
         let had_heading = self.compass.is_some() || self.attitudes.best(now).is_some();

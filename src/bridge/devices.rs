@@ -46,7 +46,7 @@ impl Bridge {
                 gimbal.manager.handle_device_heard(now);
                 if !is_answer_to_another(frame, MavId::new(system, gimbal.component)) {
                     if gimbal.driver.may_be_turning() {
-                        gimbal.driver.handle_vehicle_heading(self.vehicle.heading(now));
+                        gimbal.driver.handle_vehicle_heading(self.vehicle.heading_by_now(now));
                     }
                     gimbal.driver.handle_received(now, frame);
                 }

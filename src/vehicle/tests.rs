@@ -104,6 +104,20 @@ fn the_heartbeat_names_the_autopilot() {
     }
 }
 
+/// An autopilot may tell its attitude once a second, and turn all the time.
+#[test]
+fn the_heading_goes_on_with_the_vehicle_until_it_is_told_again() {
+    let mut vehicle = Vehicle::new();
+    assert_eq!(vehicle.heading_by_now(Timestamp::ZERO), None);
+    let (yaw, yawspeed) = (179.0_f32.to_radians(), 10.0_f32.to_radians());
+    vehicle.hear(0, &ATTITUDE_DATA { yaw, yawspeed, ..ATTITUDE_DATA::DEFAULT });
+    for (ms, expected) in [(0, 179.0), (300, -178.0), (1_000, -171.0)] {
+        let heading = vehicle.heading_by_now(Timestamp::from_millis(ms)).expect("it is fresh").degrees();
+        assert!((heading - expected).abs() < 0.01, "{ms}: {heading}");
+    }
+    assert_eq!(vehicle.heading_by_now(Timestamp::from_millis(1_001)), None);
+}
+
 /// "Use its `q` as the preferred vehicle heading source (yaw of q), else ATTITUDE_QUATERNION (31), ATTITUDE (30), else
 /// GLOBAL_POSITION_INT.hdg (33, cdeg, 65535 unknown). Heading is stale after 1 s." (protocol notes 1.8)
 #[test]

@@ -1,8 +1,10 @@
 //! The daemon is killed while it turns, and what it left behind is read by the next.
 
+use gimbald::bridge::settings::SystemId;
 use gimbald::gimbals::settings::{Family, GimbalSettings};
 
 use super::*;
+use crate::support::script::px4_heartbeat;
 
 /// `camera` has an entry that names no device; the other one, on a channel of its own on the same link, has none.
 struct Two {
@@ -60,6 +62,25 @@ fn the_device_that_turned_is_stopped_whatever_it_is_called_now() {
         two.flight.assert_rests(&format!("{kind:?}"));
         two.flight.run_for(10 * SECOND);
         assert_eq!(two.flight.world.stored_turning, Vec::<String>::new(), "{kind:?}");
+    }
+}
+
+/// A gimbal that listens to its system alone is stopped under that id, also where the autopilot has another one by now.
+#[test]
+fn it_is_stopped_under_the_system_that_told_it_to_turn() {
+    for kind in KINDS {
+        let mut flight = Flight::turning_with(kind, Settings { system_id: SystemId::Auto, ..three_links() });
+        assert_eq!(flight.world.snapshot().system_id, Some(1), "{kind:?}");
+        flight.world.kill();
+        let left_turning = flight.world.stored_turning.clone();
+        flight.world.remove(flight.places.autopilot);
+        flight.world.start(Settings { left_turning, system_id: SystemId::Auto, ..three_links() });
+        let changed = (SECOND, flight.places.autopilot, MavId::new(2, 1), px4_heartbeat());
+        let ground = (SECOND, flight.places.ground, GCS, ground_heartbeat());
+        flight.world.run_with(15 * SECOND, &[changed, ground]);
+        assert_eq!(flight.world.snapshot().system_id, Some(2), "{kind:?}");
+        flight.assert_rests(&format!("{kind:?}"));
+        assert_eq!(flight.world.stored_turning, Vec::<String>::new(), "{kind:?}");
     }
 }
 

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use super::generation::{Evidence, Generation, Step};
 use super::stopping::Stopping;
+use super::told_rates::ToldRates;
 use super::{GremsyDriver, TICK, Timer};
 use crate::gimbals::driver::DriverOutput;
 use crate::gimbals::gremsy::packet;
@@ -89,7 +90,7 @@ impl GremsyDriver {
                 let speaks = generation == Generation::V2;
                 if speaks && self.mount.may_be_turning() {
                     self.mount.forget_rotation();
-                    self.stopping = Some(Stopping::new(now, Turning::STOPPED, self.told_rates));
+                    self.stopping = Some(Stopping::new(now, Turning::STOPPED, ToldRates::ANY));
                 } else if !speaks {
                     self.stopping = None;
                 }

@@ -52,7 +52,7 @@ impl GremsyDriver {
             // To stop takes no knowledge: zeros in either protocol.
             None if is_stop => {
                 self.mount.assume_turning();
-                self.stopping.get_or_insert(Stopping::new(now, Turning::STOPPED, self.told_rates));
+                self.stopping.get_or_insert(Stopping::new(now, Turning::STOPPED, ToldRates::ANY));
             }
             None => {}
         }

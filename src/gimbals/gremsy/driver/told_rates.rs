@@ -26,6 +26,8 @@ pub struct ToldAxis {
 }
 
 impl ToldAxis {
+    const ANY: Self = Self { up: Some(1.0), down: Some(1.0) };
+
     fn add(&mut self, rate: AngularRate) {
         let rate = rate.degrees_per_second();
         let side = if rate > 0.0 { &mut self.up } else { &mut self.down };
@@ -54,6 +56,9 @@ pub struct ToldRates {
 }
 
 impl ToldRates {
+    /// An earlier run told it, or another driver: any rate.
+    pub const ANY: Self = Self { roll: ToldAxis::ANY, pitch: ToldAxis::ANY, yaw: ToldAxis::ANY };
+
     pub fn add(&mut self, turning: Turning) {
         self.roll.add(turning.roll.unwrap_or(AngularRate::ZERO));
         self.pitch.add(turning.pitch);
