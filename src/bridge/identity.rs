@@ -26,7 +26,7 @@ const GONE_FOR_GOOD: Duration = Duration::from_secs(30);
 pub struct Ties {
     /// A client is in control, and nothing may change under it.
     pub is_held: bool,
-    /// A gimbal that is there may be turning, and may hear that it is to stop under the id alone that told it to turn.
+    /// A gimbal that is there, or may come back soon, may be turning, and may hear that it is to stop under the id alone that told it to turn.
     pub is_turning: bool,
     /// Another vehicle has the fallback id.
     pub fallback_is_taken: bool,

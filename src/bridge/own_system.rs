@@ -13,7 +13,7 @@ impl Bridge {
         let before = self.identity.system();
         let ties = Ties {
             is_held: self.roster.iter().any(|gimbal| gimbal.manager.is_held()),
-            is_turning: self.roster.iter().any(|gimbal| gimbal.may_be_turning() && !gimbal.is_lost()),
+            is_turning: self.roster.iter().any(|gimbal| gimbal.may_be_turning() && gimbal.may_come_back(now)),
             fallback_is_taken: self.is_fallback_taken(now),
         };
         let was_bootstrap = self.identity.is_bootstrap();

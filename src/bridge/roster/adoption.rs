@@ -17,6 +17,9 @@ use crate::wire::MavId;
 /// id may serve another gimbal.
 const GONE_FOR_GOOD: Duration = Duration::from_secs(10);
 
+/// A cable that is out is plugged in again by then.
+const MAY_COME_BACK_WITHIN: Duration = Duration::from_secs(60);
+
 /// Two devices under one id are remembered for so long.
 const TWIN_REMEMBERED: Duration = Duration::from_secs(60);
 
@@ -63,8 +66,13 @@ pub struct Renamed {
 }
 
 impl Gimbal {
-    pub(in crate::bridge) fn is_lost(&self) -> bool {
+    pub(super) fn is_lost(&self) -> bool {
         self.manager.state() == DeviceState::Lost
+    }
+
+    /// Whether its device is there, or was not long ago.
+    pub fn may_come_back(&self, now: Timestamp) -> bool {
+        !self.is_lost() || now.since(self.heard) < MAY_COME_BACK_WITHIN
     }
 
     /// Whether nobody waits for its device to come back.

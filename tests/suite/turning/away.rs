@@ -1,6 +1,9 @@
 //! Its cable is away while the rotation ends.
 
+use gimbald::bridge::settings::SystemId;
+
 use super::*;
+use crate::support::script::px4_heartbeat;
 
 /// How the rotation ends that nobody wants any more.
 #[derive(Clone, Copy, Debug)]
@@ -94,5 +97,25 @@ fn what_was_heard_to_stop_is_left_alone_when_it_is_back() {
         flight.run_for(8 * SECOND);
         let setpoint = flight.world.snapshot().gimbals[0].setpoint.clone();
         assert_eq!(setpoint, None, "{kind:?}: nobody has asked for anything");
+    }
+}
+
+/// A gimbal that listens to its system alone is stopped under that id, also where the autopilot has another one by the time
+/// that it is back.
+#[test]
+fn it_is_stopped_under_the_system_that_told_it_to_turn() {
+    for kind in KINDS {
+        let mut flight = Flight::turning_with(kind, Settings { system_id: SystemId::Auto, ..three_links() });
+        flight.cable.cut();
+        flight.world.remove(flight.places.autopilot);
+        let changed = (SECOND, flight.places.autopilot, MavId::new(2, 1), px4_heartbeat());
+        let ground = (SECOND, flight.places.ground, GCS, ground_heartbeat());
+        let beats = [changed, ground];
+        flight.world.run_with(9 * SECOND, &beats);
+        assert_eq!(flight.world.snapshot().system_id, Some(1), "{kind:?}");
+        flight.cable.mend();
+        flight.world.run_with(20 * SECOND, &beats);
+        assert_eq!(flight.world.snapshot().system_id, Some(2), "{kind:?}");
+        flight.assert_rests(&format!("{kind:?}"));
     }
 }

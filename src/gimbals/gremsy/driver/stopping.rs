@@ -74,7 +74,8 @@ pub struct Stopping {
     answers: bool,
     next: Timestamp,
     heard: HeardTime,
-    begun: Timestamp,
+    /// For how long it was heard since it began.
+    heard_at_all: HeardTime,
     /// Where it looked, and when.
     looked: Option<(Timestamp, Look)>,
     turned: Turned,
@@ -92,7 +93,7 @@ impl Stopping {
             answers: false,
             next: now,
             heard: HeardTime::new(now),
-            begun: now,
+            heard_at_all: HeardTime::new(now),
             looked: None,
             turned: Turned::new(now),
             turns_by_itself: false,
@@ -124,6 +125,7 @@ impl Stopping {
     /// It said something.
     pub fn handle_heard(&mut self, now: Timestamp) {
         self.heard.handle_heard(now);
+        self.heard_at_all.handle_heard(now);
         self.next = self.next.min(now + EVERY);
     }
 
@@ -157,7 +159,7 @@ impl Stopping {
                     true => [from_nose, over_ground]
                         .into_iter()
                         .all(|yawed| yawed.is_some_and(|yawed| moves(yawed, passed))),
-                    false => self.turns_by_itself || now.since(self.begun) < MAY_TURN_ON_FOR,
+                    false => self.turns_by_itself || self.heard_at_all.passed() < MAY_TURN_ON_FOR,
                 };
         if turns_on {
             self.heard = HeardTime::new(now);

@@ -104,7 +104,7 @@ impl GremsyDriver {
         if let Some(stopping) = &mut self.stopping {
             let is_v1 = self.search.decided() == Some(Generation::V1);
             let own = self.heard.orientation.and_then(|(_, told)| Some(told.yaw_absolute? - told.yaw));
-            let heading = if is_v1 { own } else { self.vehicle_heading };
+            let heading = if is_v1 { own.or(self.vehicle_heading) } else { self.vehicle_heading };
             let roll = status.attitude.angles().roll;
             let turns_on = stopping.handle_report(now, Look { roll, pitch: pose.pitch, yaw: pose.yaw, heading });
             if turns_on && is_v1 {

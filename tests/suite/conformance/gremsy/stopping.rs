@@ -8,7 +8,8 @@ use gimbald::geometry::AngularRate;
 use gimbald::gimbals::gremsy::packet;
 use gimbald::gimbals::operation::{OperationError, Restart, YawMode};
 use gimbald::manager::asked::NotDone;
-use gimbald::wire::dialect::{COMMAND_ACK_DATA, MavMessage, MessageData};
+use gimbald::wire::dialect::{COMMAND_ACK_DATA, MOUNT_ORIENTATION_DATA, MavMessage, MessageData};
+use gimbald::wire::{DatagramFrames, FrameBuffer};
 
 use super::*;
 use crate::support::interception::{Intercepted, Interceptor, Passage};
@@ -24,6 +25,8 @@ struct Deaf {
     setpoints: Rc<Cell<u32>>,
     /// Anything, nor is it heard.
     everything: Rc<Cell<bool>>,
+    /// Where North is.
+    north: Rc<Cell<bool>>,
 }
 
 impl Interceptor for Deaf {
@@ -41,8 +44,20 @@ impl Interceptor for Deaf {
         if number.is_some() && number == self.command.get() { Passage::Lost } else { Passage::Through }
     }
 
-    fn towards_core(&mut self, _bytes: &[u8]) -> Passage {
-        if self.everything.get() { Passage::Lost } else { Passage::Through }
+    fn towards_core(&mut self, bytes: &[u8]) -> Passage {
+        if self.everything.get() {
+            return Passage::Lost;
+        }
+        let mut frames = DatagramFrames::new(bytes);
+        let frame = frames.next_frame().expect("a frame");
+        match frame.decode::<MOUNT_ORIENTATION_DATA>() {
+            Some(told) if self.north.get() => {
+                let told = MavMessage::MOUNT_ORIENTATION(MOUNT_ORIENTATION_DATA { yaw_absolute: 0.0, ..told });
+                let mut buffer = FrameBuffer::default();
+                Passage::As(buffer.encode_any(frame.source(), frame.sequence(), &told).bytes().to_vec())
+            }
+            _ => Passage::Through,
+        }
     }
 }
 
@@ -168,10 +183,12 @@ fn one_that_goes_on_as_it_was_told_before_is_stopped_too() {
 /// "with 5 % loss, duplication": a second copy of an answer to the rate is none to the stop, which has not arrived.
 #[test]
 fn a_copy_of_an_answer_does_not_stop_it() {
-    for operation in [Operation::SetYawMode(YawMode::Follow), Operation::RadioControl, Operation::Reset(ResetMode::Yaw)]
-    {
+    let operations =
+        [Operation::SetYawMode(YawMode::Follow), Operation::RadioControl, Operation::Reset(ResetMode::Yaw)];
+    for (operation, knows_north) in operations.into_iter().flat_map(|it| [(it.clone(), true), (it, false)]) {
         let (mut world, places, deaf) = turning_by_name(Generation::V1);
-        deaf.setpoints.set(12);
+        deaf.north.set(!knows_north);
+        deaf.setpoints.set(40);
         let ack = COMMAND_ACK_DATA {
             command: command::DO_MOUNT_CONTROL,
             result: 0,
@@ -185,7 +202,7 @@ fn a_copy_of_an_answer_does_not_stop_it() {
         for _ in 0..20 {
             world.send(places.gimbal, GIMBAL, &MavMessage::COMMAND_ACK(ack.clone()));
         }
-        run(&mut world, places, SECOND);
+        run(&mut world, places, 2 * SECOND);
         assert_eq!(world.stored_turning.len(), 1, "{operation:?}");
         run(&mut world, places, 8 * SECOND);
         assert_eq!(deaf.setpoints.get(), 0, "the stop was said until it was heard");
