@@ -261,9 +261,11 @@ mod tests {
         assert_eq!(stopped_after(-5.0, turns_on), Some(1_000), "that is no rotation that it was told");
         // Slower than it was told: that is all it can.
         assert!(stopped_after(60.0, |seconds| 4.0 * seconds.min(3.0)).is_some_and(|millis| millis >= 3_900));
-        let slowly = |seconds: f64| 0.5 * seconds.min(4.0);
-        assert!(stopped_after(0.5, slowly).is_some_and(|millis| (4_000..=5_200).contains(&millis)));
-        assert_eq!(stopped_after(0.5, |seconds| 0.1 * seconds), Some(1_000), "it creeps");
+        let slowly = |seconds: f64| 1.2 * seconds.min(4.0);
+        assert!(stopped_after(1.2, slowly).is_some_and(|millis| (4_000..=5_200).contains(&millis)));
+        assert_eq!(stopped_after(0.5, |seconds| 0.5 * seconds), Some(1_000), "it creeps");
+        let gust = |seconds: f64| 0.3 * (seconds * std::f64::consts::PI).sin();
+        assert_eq!(stopped_after(0.3, gust), Some(1_000));
     }
 
     /// Nothing waits for ever for one that is turned by something else.

@@ -8,10 +8,10 @@ use crate::geometry::AngularRate;
 use crate::gimbals::setpoint::Turning;
 
 /// It turns on when that is so much of the least that it was told, or so many degrees per second where its own speed allows no
-/// more, and not less than it may seem to turn at rest.
+/// more, and not less than it may seem to turn at rest, in a gust.
 const TURNS_ON: f64 = 0.5;
 const TURNS_ON_DPS: f64 = 2.0;
-const SEEMS_TO_TURN_DPS: f64 = 0.25;
+const SEEMS_TO_TURN_DPS: f64 = 1.0;
 
 /// How it turns is taken from where it looked so long before; longer where it may turn slowly, so that noise comes to less.
 const WITHIN: Duration = Duration::from_millis(250);
@@ -92,13 +92,16 @@ mod tests {
             (&[5.0],              5.0,      true),
             (&[5.0],              2.4,      true),
             (&[5.0],              1.9,      false),
+            (&[1.5],              1.0,      true),
+            (&[1.5],              0.9,      false),
             (&[5.0],             -5.0,      false),
             (&[5.0, -20.0],      -5.0,      true),
             (&[5.0, 60.0],        4.0,      true),
             // That is all it can.
             (&[100.0],            4.0,      true),
-            (&[100.0, 0.6],       0.5,      true),
-            (&[0.4],              0.2,      false),
+            (&[100.0, 0.6],       1.1,      true),
+            // A gust.
+            (&[100.0, 0.6],       0.9,      false),
         ] {
             let second = Duration::from_secs(1);
             assert_eq!(told(rates).is_as_told(turns_at, second), turns_on, "{rates:?} {turns_at}");
