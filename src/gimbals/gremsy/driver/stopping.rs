@@ -43,20 +43,24 @@ impl Look {
     }
 }
 
-/// How far yaw has turned since a moment, degrees; `None` in a frame that was not known all the time.
+/// How far it has turned since a moment, degrees; yaw is `None` in a frame that was not known all the time.
 #[derive(Clone, Copy, Debug)]
 struct Turned {
     since: Timestamp,
+    rolled: f64,
+    pitched: f64,
     from_nose: Option<f64>,
     over_ground: Option<f64>,
 }
 
 impl Turned {
     const fn new(since: Timestamp) -> Self {
-        Self { since, from_nose: Some(0.0), over_ground: Some(0.0) }
+        Self { since, rolled: 0.0, pitched: 0.0, from_nose: Some(0.0), over_ground: Some(0.0) }
     }
 
-    fn add(&mut self, from_nose: Option<f64>, over_ground: Option<f64>) {
+    fn add(&mut self, [rolled, pitched]: [f64; 2], from_nose: Option<f64>, over_ground: Option<f64>) {
+        self.rolled += rolled;
+        self.pitched += pitched;
         let sum = |before: Option<f64>, more: Option<f64>| Some(before? + more?);
         self.from_nose = sum(self.from_nose, from_nose);
         self.over_ground = sum(self.over_ground, over_ground);
@@ -79,7 +83,8 @@ pub struct Stopping {
     /// Where it looked, and when.
     looked: Option<(Timestamp, Look)>,
     turned: Turned,
-    /// It turned from the nose and over ground when that was last judged: one that rests does so in one of them.
+    /// It went on and on when that was last judged, and yaw from the nose and over ground: one that rests does so in one of them,
+    /// and one that sways comes back.
     turns_by_itself: bool,
 }
 
@@ -143,24 +148,21 @@ impl Stopping {
         self.looked = Some((now, look));
         let turned = |frame| Some((look.yaw_in(frame)? - before.yaw_in(frame)?).wrapped().degrees());
         let (from_nose, over_ground) = (turned(YawFrame::Vehicle), turned(YawFrame::Earth));
-        self.turned.add(from_nose, over_ground);
-        self.judge(now);
         let pitched = (look.pitch - before.pitch).degrees();
         let rolled = (look.roll - before.roll).wrapped().degrees();
+        self.turned.add([rolled, pitched], from_nose, over_ground);
+        self.judge(now);
         let yawed = match self.turning.yaw_frame {
             YawFrame::Vehicle => from_nose.or(over_ground),
             YawFrame::Earth => over_ground.or(from_nose),
         };
-        // Pitch and roll are over ground, and no vehicle turns them.
-        let turns_on = self.told.pitch.is_as_told(pitched, passed)
+        let may_yaw = yawed.is_some_and(|yawed| self.told.yaw.is_as_told(yawed, passed));
+        let in_both =
+            || [from_nose, over_ground].into_iter().all(|yawed| yawed.is_some_and(|yawed| moves(yawed, passed)));
+        let seems_to = self.told.pitch.is_as_told(pitched, passed)
             || self.told.roll.is_as_told(rolled, passed)
-            || yawed.is_some_and(|yawed| self.told.yaw.is_as_told(yawed, passed))
-                && match self.answers {
-                    true => [from_nose, over_ground]
-                        .into_iter()
-                        .all(|yawed| yawed.is_some_and(|yawed| moves(yawed, passed))),
-                    false => self.turns_by_itself || self.heard_at_all.passed() < MAY_TURN_ON_FOR,
-                };
+            || may_yaw && (!self.answers || in_both());
+        let turns_on = seems_to && (self.turns_by_itself || self.heard_at_all.passed() < MAY_TURN_ON_FOR);
         if turns_on {
             self.heard = HeardTime::new(now);
         }
@@ -170,9 +172,11 @@ impl Stopping {
     fn judge(&mut self, now: Timestamp) {
         let passed = now.since(self.turned.since);
         if passed >= JUDGED_OVER {
-            let Turned { from_nose, over_ground, .. } = std::mem::replace(&mut self.turned, Turned::new(now));
-            let is_told = |turned: Option<f64>| turned.is_some_and(|turned| self.told.yaw.is_as_told(turned, passed));
-            self.turns_by_itself = is_told(from_nose) && is_told(over_ground);
+            let turned = std::mem::replace(&mut self.turned, Turned::new(now));
+            let yaws = |yawed: Option<f64>| yawed.is_some_and(|yawed| self.told.yaw.is_as_told(yawed, passed));
+            self.turns_by_itself = self.told.pitch.is_as_told(turned.pitched, passed)
+                || self.told.roll.is_as_told(turned.rolled, passed)
+                || yaws(turned.from_nose) && yaws(turned.over_ground);
         }
     }
 
@@ -272,6 +276,24 @@ mod tests {
     #[test]
     fn what_turns_on_for_long_is_not_waited_for() {
         assert!(stopped_after(5.0, |seconds| 5.0 * seconds).is_some_and(|millis| (10_700..=11_200).contains(&millis)));
+    }
+
+    /// A camera that sways comes back, and is not waited for for ever.
+    #[test]
+    fn one_that_sways_has_stopped_in_the_end() {
+        let sways = |millis: u64| 1.5 * (millis as f64 / 1000.0 * 5.0).sin();
+        for answers in [false, true] {
+            let pitch = AngularRate::from_degrees_per_second(5.0);
+            let mut stopping = Stopping { answers, ..begin(Turning { pitch, ..Turning::STOPPED }) };
+            let over = (50..=60_000_u64).step_by(50).find(|millis| {
+                let now = Timestamp::from_millis(*millis);
+                stopping.handle_heard(now);
+                let (pitch, yaw) = (Angle::from_degrees(sways(*millis)), Yaw::InVehicleFrame(Angle::ZERO));
+                stopping.handle_report(now, Look { roll: Angle::ZERO, pitch, yaw, heading: None });
+                stopping.is_over()
+            });
+            assert!(over.is_some_and(|millis| millis <= 12_000), "{answers} {over:?}");
+        }
     }
 
     /// Roll turns on like the others, and no vehicle does that.
