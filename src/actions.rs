@@ -66,10 +66,11 @@ impl Action {
         if let (Some(field), Some(text)) = (self.path_field(), in_path) {
             values.take(field, Value::String(text.to_owned()))?;
         }
-        let mut confirmed = None;
         for (name, value) in fields::object(body)? {
-            if name == CONFIRM && self.danger.is_some() {
-                confirmed = value.as_str().map(str::to_owned);
+            if let Some(danger) = self.danger.filter(|_| name == CONFIRM) {
+                if value.as_str() == Some(danger.word) {
+                    values.confirm();
+                }
                 continue;
             }
             match self.body_fields().find(|field| field.name == name) {
@@ -82,7 +83,7 @@ impl Action {
         }
         let asked = (self.read)(&values)?;
         match danger_of(&asked) {
-            Some(danger) if confirmed.as_deref() != Some(danger.word) => Err(Wrong::Unconfirmed(danger)),
+            Some(danger) if !values.is_confirmed() => Err(Wrong::Unconfirmed(danger)),
             Some(_) | None => Ok(asked),
         }
     }

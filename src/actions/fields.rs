@@ -153,15 +153,27 @@ fn one_of(words: &[&str]) -> String {
 
 /// What was given, each right by itself.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Values(Vec<(&'static str, Value)>);
+pub struct Values {
+    fields: Vec<(&'static str, Value)>,
+    is_confirmed: bool,
+}
 
 impl Values {
+    pub(super) fn confirm(&mut self) {
+        self.is_confirmed = true;
+    }
+
+    /// The word of what is dangerous was said.
+    pub fn is_confirmed(&self) -> bool {
+        self.is_confirmed
+    }
+
     pub(super) fn take(&mut self, field: &Field, value: Value) -> Result<(), Wrong> {
         if !field.kind.accepts(&value) {
             let found = shortened(&value);
             return Err(Wrong::Value { name: field.name, found, expected: field.kind.expected() });
         }
-        self.0.push((field.name, value));
+        self.fields.push((field.name, value));
         Ok(())
     }
 
@@ -188,7 +200,7 @@ impl Values {
     }
 
     fn find(&self, name: &str) -> Option<&Value> {
-        self.0.iter().find(|(given, _)| *given == name).map(|(_, value)| value)
+        self.fields.iter().find(|(given, _)| *given == name).map(|(_, value)| value)
     }
 }
 

@@ -1,7 +1,7 @@
 //! The table itself. Angles in degrees, pitch up and yaw to the right positive.
 
 use super::Action;
-use super::danger::{MOTORS_OFF, REBOOT, SHUTDOWN};
+use super::danger::{MOTORS_OFF, REBOOT, RETRACT_CUTS_MOTORS, SHUTDOWN};
 use super::fields::{Field, Kind, Values, Wrong, number, optional, positive, required, scale, word};
 use super::reading::{AXIS, YAW_FRAME, axis, axis_motion, motor_control, operation, point, turn, words};
 use crate::geometry::{Angle, AxisLimits};
@@ -55,7 +55,12 @@ pub const ACTIONS: &[Action] = &[
     plain("lock", "lock", "Keep its direction, yaw to North however the vehicle turns", |_| Ok(Asked::Lock)),
     plain("follow", "follow", "Keep its direction, yaw to the nose of the vehicle", |_| Ok(Asked::Follow)),
     plain("neutral", "neutral", "Go to the neutral position", |_| Ok(Asked::Neutral)),
-    plain("retract", "retract", "Go to the retracted position", |_| Ok(Asked::Retract)),
+    Action {
+        danger: Some(&RETRACT_CUTS_MOTORS),
+        ..plain("retract", "retract", "Go to the retracted position", |values| {
+            Ok(Asked::Retract { may_cut_motors: values.is_confirmed() })
+        })
+    },
     Action {
         path: "roi",
         command: "roi",

@@ -54,6 +54,9 @@ fn what_is_dangerous_has_its_word() {
     }
     let on = read("motors", None, r#"{"state": "on"}"#).expect("not dangerous");
     assert!(!on.is_dangerous());
+    for (body, may_cut_motors) in [("", false), (r#"{"confirm": "motors off"}"#, true), (r#"{"confirm": ""}"#, false)] {
+        assert_eq!(read("retract", None, body), Ok(Asked::Retract { may_cut_motors }), "the core asks for it: {body}");
+    }
     assert!(read("neutral", None, r#"{"confirm": "neutral"}"#).is_err(), "no word is needed there");
 }
 

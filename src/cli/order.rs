@@ -43,8 +43,9 @@ fn command(action: &'static Action) -> Command {
     for (at, field) in action.fields.iter().enumerate() {
         command = command.arg(argument(field).display_order(at));
     }
-    if let Some(Danger { word, cost }) = action.danger {
-        let help = format!("Without it '{word}' is not done, which can cost the camera or the flight: {cost}");
+    if let Some(Danger { word, when, cost }) = action.danger {
+        let when = when.map(|when| format!(" ({when})").replace('`', "")).unwrap_or_default();
+        let help = format!("Without it '{word}' is not done{when}, which can cost the camera or the flight: {cost}");
         command = command.arg(Arg::new(CONFIRM).long(confirmation(word)).action(ArgAction::SetTrue).help(help));
     }
     if action.command == "turn" {
@@ -84,13 +85,16 @@ fn typed(action: &Action, name: &str) -> String {
     }
 }
 
+/// What is to be typed for what is dangerous to be done.
+pub fn unconfirmed(Danger { word, cost, .. }: &Danger) -> String {
+    let option = confirmation(word);
+    format!("'{word}' can cost the camera or the flight: {cost}; if it is meant, add --{option}")
+}
+
 /// What is wrong, in the words of the command line.
 fn in_typed_words(action: &Action, wrong: Wrong) -> String {
     match wrong {
-        Wrong::Unconfirmed(Danger { word, cost }) => {
-            let option = confirmation(word);
-            format!("'{word}' can cost the camera or the flight: {cost}; if it is meant, add --{option}")
-        }
+        Wrong::Unconfirmed(danger) => unconfirmed(danger),
         Wrong::Value { name, found, expected } => {
             format!("{}: found {found}; expected {expected}", typed(action, name))
         }
@@ -242,6 +246,8 @@ mod tests {
             ("combined-attitude off",                 None,            r#"{"enabled":false}"#),
             ("motors on",                             None,            r#"{"state":"on"}"#),
             ("motors off --yes-motors-off",           None,            r#"{"confirm":"motors off","state":"off"}"#),
+            ("retract --yes-motors-off",              None,            r#"{"confirm":"motors off"}"#),
+            ("retract",                               None,            "{}"),
             ("stop",                                  None,            "{}"),
         ] {
             let (_, path, sent) = act(line).expect(line);

@@ -40,7 +40,13 @@ pub enum ClientError {
     #[error("{url} did not answer within {} s: is it gimbald, and can it be reached?", .within.as_secs())]
     TimedOut { url: String, within: Duration },
     #[error("gimbald at {url} answers {status}: {reason}")]
-    Refused { url: String, status: StatusCode, reason: String },
+    Refused {
+        url: String,
+        status: StatusCode,
+        reason: String,
+        /// The same as a word for programs, where there is one.
+        word: Option<String>,
+    },
     #[error("what answers at {url} is not a gimbald of this version: {what}")]
     NotGimbald { url: String, what: String },
     #[error("the answer cannot be shown")]
@@ -163,7 +169,10 @@ impl Target {
         }
         match serde_json::from_slice::<Value>(&body).map(printable) {
             Ok(Value::Object(refusal)) => match refusal.get("error") {
-                Some(Value::String(reason)) => Err(ClientError::Refused { url: url(), status, reason: reason.clone() }),
+                Some(Value::String(reason)) => {
+                    let word = refusal.get("reason").and_then(Value::as_str).map(str::to_owned);
+                    Err(ClientError::Refused { url: url(), status, reason: reason.clone(), word })
+                }
                 Some(_) | None => Err(self.not_gimbald(status)),
             },
             Ok(_) | Err(_) => Err(self.not_gimbald(status)),

@@ -17,9 +17,10 @@ use super::status::text;
 use crate::actions::percent_encoded;
 use crate::bridge::snapshot::GimbalSnapshot;
 use crate::cli::GimbalArgs;
-use crate::cli::order::{Act, Order};
+use crate::cli::order::{Act, Order, unconfirmed};
 use crate::config::DEFAULT_FILE;
 use crate::exit_code::ExitCode;
+use crate::manager::asked::UNCONFIRMED;
 use crate::token::{Token, TokenError};
 
 /// Between two requests to turn on; well below the shortest sensible `rate_timeout_s`.
@@ -32,6 +33,9 @@ enum GimbalError {
     Client(#[from] ClientError),
     #[error("the name of the gimbal is missing: gimbald gimbal NAME COMMAND; 'gimbald gimbal' lists them")]
     NoName,
+    /// It is dangerous to this gimbal, which the daemon alone knows.
+    #[error("{0}")]
+    Unconfirmed(String),
     #[error("control needs the token: name its file with --token-file, or in [http] token_file of {}", .0.display())]
     NoToken(PathBuf),
     #[error("the token file {} {error}{}", path.display(), if is_forbidden(error) { "; run it with sudo" } else { "" })]
@@ -42,7 +46,7 @@ impl GimbalError {
     fn exit_code(&self) -> ExitCode {
         match self {
             Self::Client(error) => error.exit_code(),
-            Self::NoName => ExitCode::Usage,
+            Self::NoName | Self::Unconfirmed(_) => ExitCode::Usage,
             Self::NoToken(_) => ExitCode::NoPermission,
             Self::Token { error, .. } if is_forbidden(error) => ExitCode::NoPermission,
             Self::Token { .. } => ExitCode::Config,
@@ -87,7 +91,8 @@ fn run(arguments: &GimbalArgs, output: &mut impl Write) -> Result<(), GimbalErro
             Some(Order::Parameters { name }) => parameters(&target, &of_gimbal, name.as_deref(), arguments.json).await,
             Some(Order::Act(act)) => {
                 let token = token(arguments)?;
-                let answer = carry_out(&target, &of_gimbal, act, &token).await?;
+                let answer =
+                    carry_out(&target, &of_gimbal, act, &token).await.map_err(|error| in_typed_words(act, error))?;
                 let Done { done } = serde_json::from_slice(&answer).map_err(|error| target.not_gimbald(error))?;
                 Ok(if arguments.json {
                     as_it_is(&answer)
@@ -101,6 +106,16 @@ fn run(arguments: &GimbalArgs, output: &mut impl Write) -> Result<(), GimbalErro
     runtime.shutdown_background();
     output.write_all(result?.as_bytes()).and_then(|()| output.flush()).map_err(ClientError::Output)?;
     Ok(())
+}
+
+/// What is to be typed, where the daemon answered what is to stand in a body.
+fn in_typed_words(act: &Act, error: GimbalError) -> GimbalError {
+    match (&error, act.action.danger) {
+        (GimbalError::Client(ClientError::Refused { word: Some(word), .. }), Some(danger)) if word == UNCONFIRMED => {
+            GimbalError::Unconfirmed(unconfirmed(danger))
+        }
+        _ => error,
+    }
 }
 
 /// The answer to what was asked for.

@@ -12,6 +12,8 @@ pub struct Capabilities {
     pub turns: bool,
     /// Its maker's commands for motors, modes and a restart are for it.
     pub operates: bool,
+    /// What it does for "retract" is to switch its motors off: dangerous, by whatever name it is asked for.
+    pub retract_cuts_motors: bool,
     /// It cannot tell whether it has a radio control of its own, and the configuration (`v1_radio_control`) says no.
     pub radio_control_untold: bool,
 }
@@ -25,7 +27,14 @@ impl Capabilities {
             | CapFlags::HAS_PITCH_LOCK
             | CapFlags::HAS_YAW_AXIS
             | CapFlags::HAS_YAW_FOLLOW;
-        Self { flags, limits: Limits::default(), turns: true, operates: false, radio_control_untold: false }
+        Self {
+            flags,
+            limits: Limits::default(),
+            turns: true,
+            operates: false,
+            retract_cuts_motors: false,
+            radio_control_untold: false,
+        }
     }
 
     /// Why it is not handed to a radio control of its own; `known` where it is known to have none.

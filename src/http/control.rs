@@ -24,7 +24,7 @@ use super::server::Visit;
 use crate::actions::{Action, Wrong};
 use crate::daemon::window::CoreRequest;
 use crate::gimbals::operation::{Operation, OperationError};
-use crate::manager::asked::{Answer, Asked, NotDone};
+use crate::manager::asked::{Answer, Asked, NotDone, UNCONFIRMED};
 use crate::manager::control::STANDS_IN_THE_WAY;
 use crate::manager::events::{Names, why};
 use crate::token::Token;
@@ -142,6 +142,14 @@ pub async fn act(
     }
     match answer {
         Some(Ok(())) => Json(Done { gimbal, done: action.command }).into_response(),
+        Some(Err(NotDone::Refused { refusal, .. }))
+            if refusal.reason == UNCONFIRMED
+                && let Some(danger) = action.danger =>
+        {
+            let text = Wrong::Unconfirmed(danger).to_string();
+            Refusal { reason: Some(UNCONFIRMED), ..Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, text) }
+                .into_response()
+        }
         Some(Err(NotDone::UnknownGimbal)) => unknown_gimbal(&window.snapshots, &gimbal).await,
         Some(Err(not_done)) => refused(not_done).into_response(),
         None => Refusal::new(StatusCode::GATEWAY_TIMEOUT, "the core did not answer in time").into_response(),

@@ -73,13 +73,13 @@ fn asking(action: &Action, parameters: &[&Value]) -> Value {
     for field in action.body_fields() {
         properties.insert(field.name.to_owned(), schema(field));
     }
-    if let Some(Danger { word, cost }) = action.danger {
-        let about = format!("what is dangerous needs it: {cost}");
+    if let Some(Danger { word, when, cost }) = action.danger {
+        let when = when.unwrap_or("always");
+        let about = format!("what is dangerous needs it, {when}: {cost}");
         properties.insert(CONFIRM.to_owned(), json!({"const": word, "description": about}));
     }
     let mut required: Vec<&str> = action.body_fields().filter(|field| field.required).map(|field| field.name).collect();
-    // Where there is nothing else to say it is always dangerous.
-    required.extend(action.danger.filter(|_| action.fields.is_empty()).map(|_| CONFIRM));
+    required.extend(action.danger.filter(|danger| danger.when.is_none()).map(|_| CONFIRM));
     let body = json!({
         "type": "object",
         "additionalProperties": false,

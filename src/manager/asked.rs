@@ -14,6 +14,9 @@ use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 use crate::wire::ids::GimbalFlags;
 
+/// Why something dangerous is refused whose word was not said.
+pub const UNCONFIRMED: &str = "unconfirmed";
+
 /// Something asked of a gimbal.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Asked {
@@ -42,7 +45,10 @@ pub enum Asked {
     /// … or to the nose of the vehicle.
     Follow,
     Neutral,
-    Retract,
+    Retract {
+        /// The word that motors off needs was said, for a gimbal that switches them off to retract.
+        may_cut_motors: bool,
+    },
     LookAt {
         latitude_deg: f64,
         longitude_deg: f64,
@@ -177,7 +183,10 @@ impl GimbalManager {
                 let flags = GimbalFlags::NEUTRAL;
                 self.handle_demand(now, who, &Demand { flags, ..Demand::default() }, around)
             }
-            Asked::Retract => {
+            Asked::Retract { may_cut_motors } => {
+                if self.steerable()?.retract_cuts_motors {
+                    self.check_danger(who, *may_cut_motors)?;
+                }
                 let flags = GimbalFlags::RETRACT;
                 self.handle_demand(now, who, &Demand { flags, ..Demand::default() }, around)
             }
@@ -244,8 +253,9 @@ impl GimbalManager {
         if operation.needs_control() {
             let voice = self.gate(now, who, around).and_then(Voice::needs_whole);
             voice.map_err(|refusal| self.not_done(refusal))?;
-            if asked.is_dangerous() && self.control.primary() != Some(who) {
-                return Err(self.not_done(Refusal::denied("only_for_the_holder")));
+            if asked.is_dangerous() {
+                // Its word was said where it was read.
+                self.check_danger(who, true).map_err(|refusal| self.not_done(refusal))?;
             }
         }
         if self.state != DeviceState::Alive {
@@ -278,6 +288,17 @@ impl GimbalManager {
         }
         self.note_operated(now);
         self.carry_out(now, around);
+    }
+
+    /// "Dangerous ones need an explicit word and the holder's right", also where everybody may steer.
+    fn check_danger(&self, who: MavId, is_confirmed: bool) -> Result<(), Refusal> {
+        if !is_confirmed {
+            return Err(Refusal::denied(UNCONFIRMED));
+        }
+        if self.control.primary() != Some(who) {
+            return Err(Refusal::denied("only_for_the_holder"));
+        }
+        Ok(())
     }
 
     fn not_done(&self, refusal: Refusal) -> NotDone {

@@ -1,5 +1,6 @@
 //! What happened around a gimbal, as far as a person may want to know it.
 
+use super::asked::UNCONFIRMED;
 use super::control::{Change, How, Place};
 use crate::gimbals::mavlink_v1::config::NO_RADIO_CONTROL;
 use crate::gimbals::operation::{Operation, OperationError, STARTING};
@@ -289,6 +290,7 @@ fn explain(reason: &str) -> String {
         "overruled" => "it goes on moving after somebody else took over; it is obeyed again when it asks for something new",
         "acquire_war" => "control changed hands too often lately",
         "other_vehicle" => "it belongs to another vehicle",
+        UNCONFIRMED => "it is dangerous, and its word was not said",
         "only_for_the_holder" => "only who has control may ask for that",
         "half_a_pair" => "it named half of a system and component id",
         "not_an_id" => "it named something that is no id",

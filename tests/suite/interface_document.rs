@@ -18,9 +18,9 @@ fn every_action_has_its_row() {
 fn row(action: &Action) -> String {
     let fields: Vec<String> = action.body_fields().map(described).collect();
     let mut fields = if fields.is_empty() { "–".to_owned() } else { fields.join("; ") };
-    if let Some(word) = action.word() {
-        let when = if action.path == "motors" { " for `off`" } else { "" };
-        let confirmed = format!("`{CONFIRM}`: `{word}`{when}");
+    if let Some(danger) = action.danger {
+        let when = danger.when.map(|when| format!(" {when}")).unwrap_or_default();
+        let confirmed = format!("`{CONFIRM}`: `{}`{when}", danger.word);
         fields = if fields == "–" { confirmed } else { format!("{fields}; {confirmed}") };
     }
     format!("| `{}` | {} | {fields} | `{}` |", action.path, action.about, action.command)

@@ -189,6 +189,7 @@ impl Core {
             limits: Default::default(),
             turns: true,
             operates: false,
+            retract_cuts_motors: false,
             radio_control_untold: false,
         };
         core.say(DriverOutput::Report(Report::Known(Identity::default(), capabilities)));

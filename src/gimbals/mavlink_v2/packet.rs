@@ -59,7 +59,14 @@ pub fn read_information(frame: &Frame<'_>) -> Option<DeviceInformation> {
             firmware: (message.firmware_version != 0).then(|| message.firmware_version.to_le_bytes()),
             uid: (message.uid != 0).then_some(message.uid),
         },
-        capabilities: Capabilities { flags, limits, turns: true, operates: false, radio_control_untold: false },
+        capabilities: Capabilities {
+            flags,
+            limits,
+            turns: true,
+            operates: false,
+            retract_cuts_motors: false,
+            radio_control_untold: false,
+        },
         gimbal_device_id: message.gimbal_device_id,
     })
 }

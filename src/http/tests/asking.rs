@@ -3,7 +3,7 @@
 use super::*;
 use crate::actions::{ACTIONS, Action, CONFIRM, Kind};
 use crate::gimbals::operation::{Motors, Operation, OperationError};
-use crate::manager::asked::NotDone;
+use crate::manager::asked::{NotDone, UNCONFIRMED};
 use crate::manager::request::Refusal;
 use crate::wire::MavId;
 use crate::wire::ids::CommandResult;
@@ -314,6 +314,30 @@ fn what_is_not_done_has_its_status_and_its_reason() {
     ] {
         let answer = with_token(Err(not_done)).order(STOP, "");
         assert_eq!((answer.status, answer.json()), (status, expected));
+    }
+}
+
+/// "Dangerous ones need an explicit word in the body": whether a retract cuts the motors the core alone knows, and what is
+/// to be said is told as for what is always dangerous.
+#[test]
+fn a_retract_that_cuts_the_motors_is_told_its_word() {
+    let unconfirmed = NotDone::Refused { refusal: Refusal::denied(UNCONFIRMED), holder: None };
+    let answer = with_token(Err(unconfirmed)).order("/api/v1/gimbals/camera/retract", "");
+    let error = "this is dangerous: with retract_allowed a Gremsy's motors are switched off; the camera falls to where its \
+                 weight takes it, and some firmware switches the motors on again only after a restart; it is done when \
+                 the body says \"confirm\": \"motors off\"";
+    assert_eq!((answer.status, answer.json()), (422, json!({"error": error, "reason": "unconfirmed"})));
+
+    let window = with_token(Ok(()));
+    for (body, may_cut_motors) in [
+        ("", false),
+        (r#"{"confirm": "retract"}"#, false),
+        (r#"{"confirm": true}"#, false),
+        (r#"{"confirm": "motors off"}"#, true),
+    ] {
+        assert_eq!(window.order("/api/v1/gimbals/camera/retract", body).status, 200, "{body}");
+        let asked = Asked::Retract { may_cut_motors };
+        assert_eq!(window.asked.try_recv(), Ok(("camera".to_owned(), asked)), "{body}");
     }
 }
 

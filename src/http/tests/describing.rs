@@ -31,7 +31,9 @@ fn the_window_describes_itself() {
     }
     let all = "200 400 401 403 404 408 409 413 415 422 501 502 503 504".split(' ').collect::<Vec<_>>();
     assert_eq!(statuses("/api/v1/gimbals/{name}/stop", "post"), all);
-    for (action, body, is_needed) in [("stop", json!([]), false), ("reboot", json!([CONFIRM]), true)] {
+    for (action, body, is_needed) in
+        [("stop", json!([]), false), ("retract", json!([]), false), ("reboot", json!([CONFIRM]), true)]
+    {
         let request = &described["paths"][format!("/api/v1/gimbals/{{name}}/{action}")]["post"]["requestBody"];
         assert_eq!(request["required"], is_needed, "{action}");
         assert_eq!(request["content"]["application/json"]["schema"]["required"], body, "{action}");

@@ -200,23 +200,22 @@ impl GremsyDriver {
     fn capabilities(&self) -> Capabilities {
         let told = self.information.as_ref().map(|information| information.capabilities);
         let limits = self.limits(told.map(|told| told.limits));
-        match (self.search.decided(), told) {
+        let (flags, limits) = match (self.search.decided(), told) {
             (Some(Generation::V2), Some(told)) => {
                 let infinite = told.flags.contains(CapFlags::SUPPORTS_INFINITE_YAW);
                 let yaw = limits.yaw.filter(|_| !infinite);
                 // "Retract" does work, whatever it is turned into.
-                let flags = told.flags | CapFlags::HAS_RETRACT | CapFlags::HAS_NEUTRAL;
-                Capabilities {
-                    flags,
-                    limits: Limits { yaw, ..limits },
-                    turns: true,
-                    operates: true,
-                    radio_control_untold: false,
-                }
+                (told.flags | CapFlags::HAS_RETRACT | CapFlags::HAS_NEUTRAL, Limits { yaw, ..limits })
             }
-            (_, _) => {
-                Capabilities { flags: v1_flags(), limits, turns: true, operates: true, radio_control_untold: false }
-            }
+            (_, _) => (v1_flags(), limits),
+        };
+        Capabilities {
+            flags,
+            limits,
+            turns: true,
+            operates: true,
+            retract_cuts_motors: self.settings.retract_allowed,
+            radio_control_untold: false,
         }
     }
 

@@ -31,6 +31,7 @@ pub fn capabilities(settings: &V1Settings) -> Capabilities {
         },
         turns: false,
         operates: false,
+        retract_cuts_motors: false,
         radio_control_untold: settings.radio_control == V1RadioControl::None,
     }
 }

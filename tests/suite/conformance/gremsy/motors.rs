@@ -2,7 +2,7 @@
 
 use gimbald::gimbals::operation::{Motors, OperationError};
 use gimbald::manager::asked::NotDone;
-
+use gimbald::manager::request::Refusal;
 use gimbald::wire::dialect::COMMAND_ACK_DATA;
 
 use super::*;
@@ -127,6 +127,36 @@ fn motors_that_run_are_not_switched_on_by_way_of_home() {
     assert_looks(&world, -30.0, 20.0);
 }
 
+/// "Dangerous ones (motors off, reboot) need an explicit word and the holder's right": a retract that switches the motors
+/// off is one of them; where it only stows the camera it is not.
+#[test]
+fn a_retract_that_cuts_the_motors_needs_the_word_and_the_right() {
+    let denied = |reason| Some(Err(NotDone::Refused { refusal: Refusal::denied(reason), holder: None }));
+    for generation in [Generation::V1, Generation::V2] {
+        let allowed = GremsySettings { retract_allowed: true, ..GremsySettings::default() };
+        let (mut world, places) = running_with(device(generation), allowed);
+        for (may_cut_motors, reason) in [(false, "unconfirmed"), (true, "only_for_the_holder")] {
+            assert_eq!(ask(&mut world, places, &Asked::Retract { may_cut_motors }), denied(reason), "{generation:?}");
+        }
+        take_control(&mut world);
+        let unconfirmed = Asked::Retract { may_cut_motors: false };
+        assert_eq!(ask(&mut world, places, &unconfirmed), denied("unconfirmed"), "{generation:?}");
+        assert_eq!(orders(&mut world, places), (vec![], vec![]), "{generation:?}: it was told nothing");
+        assert_eq!(seen(&world).details.motors_on, Some(true), "{generation:?}");
+
+        take_control(&mut world);
+        assert_eq!(ask(&mut world, places, &Asked::Retract { may_cut_motors: true }), Some(Ok(())), "{generation:?}");
+        assert_eq!(seen(&world).details.motors_on, Some(false), "{generation:?}");
+
+        // Stowed, where nobody has control and everybody may steer.
+        let stowed = GremsySettings { stow_pitch: Angle::from_degrees(-60.0), ..GremsySettings::default() };
+        let (mut world, places) = running_with(device(generation), stowed);
+        assert_eq!(ask(&mut world, places, &Asked::Retract { may_cut_motors: false }), Some(Ok(())), "{generation:?}");
+        assert_eq!(seen(&world).details.motors_on, Some(true), "{generation:?}");
+        assert_looks(&world, -60.0, 0.0);
+    }
+}
+
 /// A gimbal that is told to stay retracted keeps its motors off, and whoever asks for them is told that they are.
 #[test]
 fn retract_keeps_them_off() {
@@ -134,7 +164,7 @@ fn retract_keeps_them_off() {
         running_with(device(Generation::V2), GremsySettings { retract_allowed: true, ..GremsySettings::default() });
     take_control(&mut world);
     let retract = OperationId(1_000 + world.answers.len() as u64);
-    world.input(Input::Asked { id: retract, gimbal: "camera", asked: &Asked::Retract });
+    world.input(Input::Asked { id: retract, gimbal: "camera", asked: &Asked::Retract { may_cut_motors: true } });
     run(&mut world, places, 2 * SECOND);
 
     let id = ask_for(&mut world, places, Motors::On, 8 * SECOND);

@@ -110,7 +110,7 @@ fn assert_refused(world: &mut World) {
         Asked::Lock,
         Asked::Follow,
         Asked::Neutral,
-        Asked::Retract,
+        Asked::Retract { may_cut_motors: false },
         Asked::EndRoi,
         Asked::LookAt {
             latitude_deg: 47.4,

@@ -164,7 +164,7 @@ fn who_is_not_in_control_is_refused_and_counted() {
         Asked::Lock,
         Asked::Follow,
         Asked::Neutral,
-        Asked::Retract,
+        Asked::Retract { may_cut_motors: false },
         place,
         Asked::EndRoi,
         Asked::Operation(Operation::Motors(Motors::On)),
@@ -297,7 +297,7 @@ fn without_a_heading_what_was_locked_follows_from_where_it_looks() {
 /// "Stays where it looks at this moment": also on the way to an angle, and while it looks at a place.
 #[test]
 fn stop_stops_whatever_moves() {
-    for begin in [down_to_the_right(), Asked::Neutral, Asked::Retract, turn_right()] {
+    for begin in [down_to_the_right(), Asked::Neutral, Asked::Retract { may_cut_motors: false }, turn_right()] {
         let (mut world, places) = with_gimbal();
         assert_eq!(ask(&mut world, &begin), Ok(()));
         look(&mut world, places, -10.0, 5.0);

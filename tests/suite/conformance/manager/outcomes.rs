@@ -594,6 +594,7 @@ fn capabilities(gimbal: Gimbal) -> Capabilities {
         limits,
         turns: true,
         operates: false,
+        retract_cuts_motors: false,
         radio_control_untold: false,
     }
 }

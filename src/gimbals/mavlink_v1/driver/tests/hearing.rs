@@ -27,10 +27,10 @@ fn a_gimbal_that_cannot_say_what_it_can_is_taken_to_do_what_v1_has() {
             })
             .collect();
         assert_eq!(known.len(), 1);
-        let Capabilities { flags, limits, turns, operates, radio_control_untold } = known[0];
+        let Capabilities { flags, limits, turns, operates, retract_cuts_motors, radio_control_untold } = known[0];
         let inputs = if has_inputs { CapFlags::HAS_RC_INPUTS } else { CapFlags::empty() };
         assert_eq!(flags, plain_flags() | inputs, "{radio_control:?}");
-        assert_eq!((turns, operates, radio_control_untold), (false, false, !has_inputs));
+        assert_eq!((turns, operates, retract_cuts_motors, radio_control_untold), (false, false, false, !has_inputs));
         let degrees = |limits: Option<AxisLimits>| {
             limits.map(|limits| [limits.min().degrees().round() as i32, limits.max().degrees().round() as i32])
         };
