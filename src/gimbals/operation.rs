@@ -264,6 +264,9 @@ pub enum OperationError {
     Failed,
     #[error("the gimbal did not answer")]
     NoAnswer,
+    /// It may not be done to one that turns.
+    #[error("the gimbal may still be turning, and is being stopped; ask again when it stands")]
+    StillTurning,
     /// It was asked for parameters and has told none at all.
     #[error("the gimbal tells no parameters: it has none, or does not hear that it is asked for them")]
     NoParameters,

@@ -241,6 +241,7 @@ fn refused(not_done: NotDone) -> Refusal {
                 OperationError::NotReady => (StatusCode::SERVICE_UNAVAILABLE, "not_ready"),
                 OperationError::Busy => (StatusCode::SERVICE_UNAVAILABLE, "busy"),
                 OperationError::Rejected => (StatusCode::SERVICE_UNAVAILABLE, "rejected"),
+                OperationError::StillTurning => (StatusCode::SERVICE_UNAVAILABLE, "still_turning"),
                 OperationError::Denied => (StatusCode::BAD_GATEWAY, "denied"),
                 OperationError::Failed => (StatusCode::BAD_GATEWAY, "failed"),
                 OperationError::NoEffect(_) => (StatusCode::BAD_GATEWAY, "no_effect"),

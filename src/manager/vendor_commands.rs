@@ -133,9 +133,10 @@ fn result_of(answer: &Result<(), NotDone>) -> CommandResult {
                 CommandResult::Unsupported
             }
             OperationError::Invalid(_) | OperationError::Denied => CommandResult::Denied,
-            OperationError::NotReady | OperationError::Busy | OperationError::Rejected => {
-                CommandResult::TemporarilyRejected
-            }
+            OperationError::NotReady
+            | OperationError::Busy
+            | OperationError::Rejected
+            | OperationError::StillTurning => CommandResult::TemporarilyRejected,
             OperationError::NotThere
             | OperationError::Failed
             | OperationError::NoAnswer

@@ -290,6 +290,14 @@ fn what_is_not_done_has_its_status_and_its_reason() {
             json!({"error": "the gimbal is not there", "reason": "not_there"}),
         ),
         (
+            NotDone::Operation(OperationError::StillTurning),
+            503,
+            json!({
+                "error": "the gimbal may still be turning, and is being stopped; ask again when it stands",
+                "reason": "still_turning",
+            }),
+        ),
+        (
             NotDone::Operation(OperationError::NoAnswer),
             504,
             json!({"error": "the gimbal did not answer", "reason": "no_answer"}),

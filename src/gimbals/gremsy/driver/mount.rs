@@ -227,14 +227,19 @@ impl Mount {
         self.unanswered = 0;
     }
 
+    /// It answered none of the latest orders.
+    pub fn leaves_unanswered(&self) -> bool {
+        self.unanswered >= UNANSWERED
+    }
+
     /// It was sent orders, and answered none for long.
     pub fn is_unanswered(&self, now: Timestamp) -> bool {
-        self.unanswered >= UNANSWERED && now.since(self.unanswered_since) >= UNANSWERED_FOR
+        self.leaves_unanswered() && now.since(self.unanswered_since) >= UNANSWERED_FOR
     }
 
     /// It was told where to look, and does not leave what it is told unanswered.
     pub fn has_heard(&self) -> bool {
-        self.sent.is_some_and(|(_, sent)| self.wanted == Some(sent)) && self.unanswered < UNANSWERED
+        self.sent.is_some_and(|(_, sent)| self.wanted == Some(sent)) && !self.leaves_unanswered()
     }
 
     /// What became of a command of [`MountOutput::Command`]; false for one that is none of these.

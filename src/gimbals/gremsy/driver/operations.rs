@@ -23,8 +23,9 @@ use crate::wire::ids::{CommandResult, GimbalFlags, message};
 /// So many commands are waited for at once.
 const CAPACITY: usize = 16;
 
-/// A gimbal that may be turning has stopped by then, or does not hear.
-const STOPS_WITHIN: std::time::Duration = std::time::Duration::from_secs(2);
+/// A gimbal that may be turning has stopped by then, with two looks at it beyond the second in which it is watched, or does not
+/// hear.
+const STOPS_WITHIN: std::time::Duration = std::time::Duration::from_secs(3);
 
 /// Motors that are switched on take 3 s, and the status comes once a second.
 pub const MOTORS_SHOW_WITHIN: std::time::Duration = std::time::Duration::from_secs(5);
@@ -140,7 +141,9 @@ impl GremsyDriver {
             if is_stopped || matches!(operation, Operation::Motors(_) | Operation::Restart(_)) {
                 self.begin_operation(now, id, device, &operation);
             } else {
-                self.operated(id, Err(OperationError::NoAnswer));
+                // Only one that speaks v1 answers what it is told.
+                let is_deaf = self.search.decided() == Some(Generation::V1) && self.mount.leaves_unanswered();
+                self.operated(id, Err(if is_deaf { OperationError::NoAnswer } else { OperationError::StillTurning }));
             }
         }
     }

@@ -4,14 +4,12 @@ use std::time::Duration;
 
 use super::generation::{Evidence, Generation, Step};
 use super::stopping::Stopping;
-use super::told_rates::ToldRates;
 use super::{GremsyDriver, TICK, Timer};
 use crate::gimbals::driver::DriverOutput;
 use crate::gimbals::gremsy::packet;
 use crate::gimbals::gremsy::parameters::{Parameter, ParameterTable};
 use crate::gimbals::gremsy::version::FirmwareVersion;
 use crate::gimbals::report::Report;
-use crate::gimbals::setpoint::Turning;
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 use crate::wire::dialect::MavMessage;
@@ -90,7 +88,7 @@ impl GremsyDriver {
                 let speaks = generation == Generation::V2;
                 if speaks && self.mount.may_be_turning() {
                     self.mount.forget_rotation();
-                    self.stopping = Some(Stopping::new(now, Turning::STOPPED, ToldRates::ANY));
+                    self.stopping = Some(Stopping::of_unknown(now));
                 } else if !speaks {
                     self.stopping = None;
                 }

@@ -52,7 +52,7 @@ impl GremsyDriver {
             // To stop takes no knowledge: zeros in either protocol.
             None if is_stop => {
                 self.mount.assume_turning();
-                self.stopping.get_or_insert(Stopping::new(now, Turning::STOPPED, ToldRates::ANY));
+                self.stopping.get_or_insert(Stopping::of_unknown(now));
             }
             None => {}
         }
@@ -165,7 +165,7 @@ impl GremsyDriver {
             _ => {
                 self.stop_v2(now);
                 if let Some(stopping) = &mut self.stopping {
-                    stopping.replace();
+                    stopping.replace(now);
                 }
             }
         }
@@ -175,16 +175,21 @@ impl GremsyDriver {
     /// Begins to stop what it was told to turn in v2.
     pub(super) fn stop_v2(&mut self, now: Timestamp) {
         if let Some(turning) = self.turning.take() {
-            self.stopping = Some(Stopping::new(now, turning, self.told_rates));
+            self.stopping = Some(Stopping::new(now, turning, self.told_rates, self.told_look()));
         } else if let Some(stopping) = self.stopping.as_mut().filter(|_| self.search.decided() != Some(Generation::V1))
         {
             stopping.go_on(now);
         }
     }
 
+    /// When it last told where it looks.
+    fn told_look(&self) -> Option<Timestamp> {
+        self.heard.attitude.map(|(at, _)| at)
+    }
+
     fn stop_on_in_v2(&mut self, now: Timestamp, device: MavId) {
         if let Some(stopping) = &mut self.stopping {
-            if stopping.is_over() {
+            if stopping.is_over(now) {
                 self.stopping = None;
                 self.told_rates = ToldRates::default();
             } else if let Some(zero) = stopping.handle_timeout(now, self.is_alive) {
@@ -212,7 +217,9 @@ impl GremsyDriver {
                 self.told_rates.add(turning);
                 self.stopping = None;
             }
-            (None, Some(before)) => self.stopping = Some(Stopping::watching(now, before, self.told_rates)),
+            (None, Some(before)) => {
+                self.stopping = Some(Stopping::watching(now, before, self.told_rates, self.told_look()));
+            }
             (None, None) => {}
         }
     }

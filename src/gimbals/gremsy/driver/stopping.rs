@@ -14,6 +14,12 @@ const EVERY: Duration = Duration::from_millis(100);
 /// While it is not there, which it may be all the same.
 const EVERY_UNHEARD: Duration = Duration::from_secs(1);
 const LASTS: Duration = Duration::from_secs(1);
+/// What else it is told counts for so long, unless it is told again: it is repeated several times as often.
+const REPLACED_FOR: Duration = Duration::from_secs(1);
+
+/// One that told where it looks not longer ago tells it again, and two looks so far apart are not compared: meanwhile it may
+/// have turned round.
+const LOOKS_AGAIN_WITHIN: Duration = Duration::from_secs(3);
 
 /// One that rests does so from the nose or over ground, but for this.
 const RESTS_DPS: f64 = 0.5;
@@ -72,9 +78,9 @@ impl Turned {
 pub struct Stopping {
     turning: Turning,
     told: ToldRates,
-    /// It is told something else than zeros, which stops it as well.
-    is_replaced: bool,
-    /// It answers as well, so only what is certain counts.
+    /// Up to here it is told something else than zeros, which stops it as well.
+    replaced_until: Timestamp,
+    /// It answers as well, so only what is certain counts, and its zeros are sent elsewhere.
     answers: bool,
     next: Timestamp,
     heard: HeardTime,
@@ -82,6 +88,10 @@ pub struct Stopping {
     heard_at_all: HeardTime,
     /// Where it looked, and when.
     looked: Option<(Timestamp, Look)>,
+    /// When it told where it looks, before this began as well.
+    told_look: Option<Timestamp>,
+    /// When two looks did not tell that it turns on, since they last did.
+    seemed_to_rest: Option<Timestamp>,
     turned: Turned,
     /// It went on and on when that was last judged, and yaw from the nose and over ground: one that rests does so in one of them,
     /// and one that sways comes back.
@@ -89,36 +99,44 @@ pub struct Stopping {
 }
 
 impl Stopping {
-    /// The first zero is due at once.
-    pub fn new(now: Timestamp, turning: Turning, told: ToldRates) -> Self {
+    /// The first zero is due at once; `told_look` is when it last told where it looks.
+    pub fn new(now: Timestamp, turning: Turning, told: ToldRates, told_look: Option<Timestamp>) -> Self {
         Self {
             turning,
             told,
-            is_replaced: false,
+            replaced_until: now,
             answers: false,
             next: now,
             heard: HeardTime::new(now),
             heard_at_all: HeardTime::new(now),
             looked: None,
+            told_look,
+            seemed_to_rest: None,
             turned: Turned::new(now),
             turns_by_itself: false,
         }
     }
 
-    /// One that answers what it is told, and is told to stop elsewhere.
-    pub fn watching(now: Timestamp, turning: Turning, told: ToldRates) -> Self {
-        Self { is_replaced: true, answers: true, ..Self::new(now, turning, told) }
+    /// One that was told to turn by somebody else.
+    pub fn of_unknown(now: Timestamp) -> Self {
+        Self::new(now, Turning::STOPPED, ToldRates::ANY, None)
     }
 
-    /// Something else is told it in the place of its rotation, again and again.
-    pub fn replace(&mut self) {
-        self.is_replaced = true;
+    /// One that answers what it is told, and is told to stop elsewhere.
+    pub fn watching(now: Timestamp, turning: Turning, told: ToldRates, told_look: Option<Timestamp>) -> Self {
+        Self { answers: true, ..Self::new(now, turning, told, told_look) }
+    }
+
+    /// Something else is told it in the place of its rotation. When that is not repeated, by whoever and for whatever reason,
+    /// zeros go on.
+    pub fn replace(&mut self, now: Timestamp) {
+        self.replaced_until = now + REPLACED_FOR;
     }
 
     /// Nothing is told it any more but zeros.
     pub fn go_on(&mut self, now: Timestamp) {
-        if std::mem::take(&mut self.is_replaced) {
-            self.next = now;
+        if self.replaced_until > now {
+            (self.replaced_until, self.next) = (now, now);
         }
     }
 
@@ -136,7 +154,11 @@ impl Stopping {
 
     /// It tells where it looks; true where it tells that it turns on.
     pub fn handle_report(&mut self, now: Timestamp, look: Look) -> bool {
-        let Some((at, before)) = self.looked.filter(|(_, before)| before.yaw.frame() == look.yaw.frame()) else {
+        self.told_look = Some(now);
+        let is_like = |(at, before): &(Timestamp, Look)| {
+            before.yaw.frame() == look.yaw.frame() && now.since(*at) <= LOOKS_AGAIN_WITHIN
+        };
+        let Some((at, before)) = self.looked.filter(is_like) else {
             self.looked = Some((now, look));
             self.turned = Turned::new(now);
             return false;
@@ -162,11 +184,16 @@ impl Stopping {
         let seems_to = self.told.pitch.is_as_told(pitched, passed)
             || self.told.roll.is_as_told(rolled, passed)
             || may_yaw && (!self.answers || in_both());
-        let turns_on = seems_to && (self.turns_by_itself || self.heard_at_all.passed() < MAY_TURN_ON_FOR);
+        let turns_on = seems_to && self.may_turn_on();
         if turns_on {
             self.heard = HeardTime::new(now);
         }
+        self.seemed_to_rest = Some(now).filter(|_| !turns_on);
         turns_on
+    }
+
+    fn may_turn_on(&self) -> bool {
+        self.turns_by_itself || self.heard_at_all.passed() < MAY_TURN_ON_FOR
     }
 
     fn judge(&mut self, now: Timestamp) {
@@ -182,19 +209,22 @@ impl Stopping {
 
     /// The zero that is due.
     pub fn handle_timeout(&mut self, now: Timestamp, is_there: bool) -> Option<Setpoint> {
-        if self.is_replaced || now < self.next {
+        if self.poll_timeout().is_none_or(|due| now < due) {
             return None;
         }
         self.handle_sent(now, is_there);
         Some(Setpoint::Turn(self.turning.stopped()))
     }
 
-    pub fn is_over(&self) -> bool {
-        self.heard.passed() >= LASTS
+    /// It was heard for long enough, and looked at where it tells where it looks.
+    pub fn is_over(&self, now: Timestamp) -> bool {
+        let is_fresh = |at: Option<Timestamp>| at.is_some_and(|at| now.since(at) <= LOOKS_AGAIN_WITHIN);
+        let is_looked_at = is_fresh(self.seemed_to_rest) || !is_fresh(self.told_look) || !self.may_turn_on();
+        self.heard.passed() >= LASTS && is_looked_at
     }
 
     pub fn poll_timeout(&self) -> Option<Timestamp> {
-        Some(self.next).filter(|_| !self.is_replaced)
+        Some(self.next.max(self.replaced_until)).filter(|_| !self.answers)
     }
 }
 
@@ -211,7 +241,7 @@ mod tests {
     fn begin(turning: Turning) -> Stopping {
         let mut told = ToldRates::default();
         told.add(turning);
-        Stopping::new(Timestamp::ZERO, turning, told)
+        Stopping::new(Timestamp::ZERO, turning, told, Some(Timestamp::ZERO))
     }
 
     /// When it is over, in milliseconds; reports come twenty times a second and every zero is sent.
@@ -227,7 +257,7 @@ mod tests {
                 now,
                 Look { roll: Angle::ZERO, pitch: Angle::ZERO, yaw: Yaw::InVehicleFrame(yaw), heading: None },
             );
-            stopping.is_over()
+            stopping.is_over(now)
         })
     }
 
@@ -249,7 +279,7 @@ mod tests {
                 YawFrame::Vehicle => Yaw::InVehicleFrame(Angle::from_degrees(turned - vehicle_dps * seconds).wrapped()),
             };
             stopping.handle_report(now, Look { roll: Angle::ZERO, pitch: Angle::ZERO, yaw, heading: Some(heading) });
-            stopping.is_over()
+            stopping.is_over(now)
         })
     }
 
@@ -272,6 +302,67 @@ mod tests {
         assert_eq!(stopped_after(0.3, gust), Some(1_000));
     }
 
+    /// When one is over that was told to turn by 2 degrees per second and does so for as long as is given, which says something
+    /// all the time, and so often where it looks.
+    fn stopped_by_looks(every_ms: u64, turns_for: f64) -> Option<u64> {
+        let turning = Turning { yaw: AngularRate::from_degrees_per_second(2.0), ..Turning::STOPPED };
+        let mut stopping = begin(turning);
+        (50..=60_000).step_by(50).find(|millis| {
+            let now = Timestamp::from_millis(*millis);
+            stopping.handle_heard(now);
+            if millis.is_multiple_of(every_ms) {
+                let yaw = Yaw::InVehicleFrame(Angle::from_degrees(2.0 * (*millis as f64 / 1000.0).min(turns_for)));
+                stopping.handle_report(now, Look { roll: Angle::ZERO, pitch: Angle::ZERO, yaw, heading: None });
+            }
+            stopping.is_over(now)
+        })
+    }
+
+    /// Somebody may have asked for fewer reports of where it looks: it has not stopped before two of them say so.
+    #[test]
+    #[rustfmt::skip]
+    fn it_has_not_stopped_before_it_was_looked_at() {
+        for (every_ms, turns_for, over) in [
+            (200,      0.0,       1_000),
+            (500,      0.0,       1_500),
+            (1_000,    0.0,       2_000),
+            (2_000,    0.0,       4_000),
+            (200,      3.1,       4_400),
+            (500,      3.1,       4_500),
+            (1_000,    3.1,       4_000),
+            (2_000,    3.1,       6_000),
+            (1_000,    8.0,       9_000),
+        ] {
+            assert_eq!(stopped_by_looks(every_ms, turns_for), Some(over), "every {every_ms} ms, {turns_for} s");
+        }
+        // One that tells it no more is not waited for for ever, and one that never did not at all.
+        assert_eq!(stopped_by_looks(1_000_000, 0.0), Some(3_050));
+        let mut stopping = Stopping { told_look: None, ..begin(Turning::STOPPED) };
+        let over = (50..5_000).step_by(50).find(|millis| {
+            stopping.handle_heard(Timestamp::from_millis(*millis));
+            stopping.is_over(Timestamp::from_millis(*millis))
+        });
+        assert_eq!(over, Some(1_000));
+    }
+
+    /// What it was told in the place of its rotation is said no more, by whoever and for whatever reason.
+    #[test]
+    fn zeros_go_on_when_nothing_takes_their_place_any_more() {
+        let mut stopping = begin(Turning::STOPPED);
+        let mut zeros = Vec::new();
+        for millis in (0..6_000).step_by(50) {
+            let now = Timestamp::from_millis(millis);
+            if (1_000..2_000).contains(&millis) {
+                stopping.handle_heard(now);
+                stopping.replace(now);
+            }
+            if stopping.poll_timeout().is_some_and(|due| due <= now) {
+                zeros.extend(stopping.handle_timeout(now, false).map(|_| millis));
+            }
+        }
+        assert_eq!(zeros, [0, 2_950, 3_950, 4_950, 5_950]);
+    }
+
     /// Nothing waits for ever for one that is turned by something else.
     #[test]
     fn what_turns_on_for_long_is_not_waited_for() {
@@ -290,7 +381,7 @@ mod tests {
                 stopping.handle_heard(now);
                 let (pitch, yaw) = (Angle::from_degrees(sways(*millis)), Yaw::InVehicleFrame(Angle::ZERO));
                 stopping.handle_report(now, Look { roll: Angle::ZERO, pitch, yaw, heading: None });
-                stopping.is_over()
+                stopping.is_over(now)
             });
             assert!(over.is_some_and(|millis| millis <= 12_000), "{answers} {over:?}");
         }
@@ -308,7 +399,7 @@ mod tests {
             let roll = Angle::from_degrees(-5.0 * seconds.min(20.0));
             let yaw = Yaw::InVehicleFrame(Angle::ZERO);
             stopping.handle_report(now, Look { roll, pitch: Angle::ZERO, yaw, heading: None });
-            stopping.is_over()
+            stopping.is_over(now)
         });
         assert!(over.is_some_and(|millis| (20_700..=21_300).contains(&millis)), "{over:?}");
     }

@@ -25,6 +25,8 @@ struct Deaf {
     setpoints: Rc<Cell<u32>>,
     /// Anything, nor is it heard.
     everything: Rc<Cell<bool>>,
+    /// It is not heard.
+    mute: Rc<Cell<bool>>,
     /// Where North is.
     north: Rc<Cell<bool>>,
 }
@@ -45,7 +47,7 @@ impl Interceptor for Deaf {
     }
 
     fn towards_core(&mut self, bytes: &[u8]) -> Passage {
-        if self.everything.get() {
+        if self.everything.get() || self.mute.get() {
             return Passage::Lost;
         }
         let mut frames = DatagramFrames::new(bytes);
@@ -118,14 +120,15 @@ fn what_is_asked_by_name_waits_until_it_has_stopped() {
     for generation in [Generation::V1, Generation::V2] {
         for operation in [Operation::SetYawMode(YawMode::Follow), Operation::RadioControl] {
             let (mut world, places, deaf) = turning_by_name(generation);
-            deaf.setpoints.set(5);
+            // That is a second, and another one in which it is watched.
+            deaf.setpoints.set(10);
             assert_eq!(operate(&mut world, places, operation.clone()), Some(Ok(())), "{generation:?} {operation:?}");
             assert_rests(&mut world, places);
             // What is heard while nothing arrives does not mean that it has stopped: it tells that it turns.
             let (mut world, places, deaf) = turning_by_name(Generation::V2);
             deaf.setpoints.set(40);
             let not_done = operate(&mut world, places, operation.clone());
-            assert!(matches!(not_done, Some(Err(NotDone::Operation(_)))), "{operation:?}: {not_done:?}");
+            assert_eq!(not_done, Some(Err(NotDone::Operation(OperationError::StillTurning))), "{operation:?}");
             run(&mut world, places, 4 * SECOND);
             assert_rests(&mut world, places);
             // One that hears none of them is not left alone.
@@ -150,12 +153,46 @@ fn one_that_hears_nothing_for_long_stands_when_it_hears_again() {
         deaf.setpoints.set(u32::MAX);
         run(&mut world, places, 20 * SECOND);
         let not_done = operate(&mut world, places, operation.clone());
-        assert_eq!(not_done, Some(Err(NotDone::Operation(OperationError::NoAnswer))), "{operation:?}");
+        assert_eq!(not_done, Some(Err(NotDone::Operation(OperationError::StillTurning))), "{operation:?}");
         let before = looks(&world).1;
         run(&mut world, places, SECOND);
         assert!((looks(&world).1 - before).rem_euclid(360.0) > 4.0, "it turns: {before} {:?}", looks(&world));
         deaf.setpoints.set(0);
         run(&mut world, places, 6 * SECOND);
+        assert_rests(&mut world, places);
+    }
+}
+
+/// Nothing arrives at it, and then it is not heard either: what took the place of the rotation is said no more, so zeros are,
+/// until it stands. Silence stops nothing.
+#[test]
+fn one_that_is_lost_while_it_turns_on_is_told_to_stop() {
+    for (generation, replacement) in [
+        (Generation::V1, [NAN, NAN, 0.0, 0.0, 44.0]),
+        (Generation::V2, [NAN, NAN, 0.0, 0.0, 44.0]),
+        (Generation::V2, [0.0, 0.0, NAN, NAN, 44.0]),
+    ] {
+        let (mut world, places, deaf) = turning(generation);
+        let before = looks(&world).1;
+        deaf.setpoints.set(u32::MAX);
+        demand(&mut world, places, replacement);
+        run(&mut world, places, 3 * SECOND);
+        deaf.mute.set(true);
+        run(&mut world, places, 8 * SECOND);
+        assert_eq!(seen(&world).state, "lost");
+        world.forget();
+        run(&mut world, places, 5 * SECOND);
+        let (commands, setpoints) = orders(&mut world, places);
+        let rates = setpoints.iter().map(|zero| [zero.angular_velocity_y, zero.angular_velocity_z]);
+        let all = commands.iter().map(|zero| [zero.param2, zero.param3]).chain(rates).collect::<Vec<_>>();
+        assert_eq!(all, [[0.0; 2]; 5], "{generation:?} {replacement:?}: one a second");
+
+        deaf.setpoints.set(0);
+        run(&mut world, places, 10 * SECOND);
+        deaf.mute.set(false);
+        run(&mut world, places, SECOND / 2);
+        let turned = looks(&world).1 - before;
+        assert!((80.0..=88.0).contains(&turned), "{generation:?} {replacement:?}: by {turned} in 16 s and not in 26");
         assert_rests(&mut world, places);
     }
 }
@@ -172,7 +209,7 @@ fn one_that_goes_on_as_it_was_told_before_is_stopped_too() {
         run(&mut world, places, SECOND / 4);
     }
     let not_done = operate(&mut world, places, Operation::SetYawMode(YawMode::Follow));
-    assert_eq!(not_done, Some(Err(NotDone::Operation(OperationError::NoAnswer))));
+    assert_eq!(not_done, Some(Err(NotDone::Operation(OperationError::StillTurning))));
     assert_eq!(world.stored_turning, ["camera\t1/154\tgremsy"]);
     deaf.setpoints.set(0);
     run(&mut world, places, 4 * SECOND);
