@@ -28,9 +28,10 @@ pub struct Known {
 pub type Catalogue = fn(&dyn Fn(&str) -> bool) -> Vec<Known>;
 
 /// One to be read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Wanted {
-    Named(Known),
+    /// The one with this name, and its place where that is known.
+    Named { name: String, index: Option<u16> },
     /// The one with this `param_index`.
     Place(u16),
 }
@@ -38,11 +39,13 @@ pub enum Wanted {
 /// What there should be.
 #[derive(Debug)]
 pub enum List {
-    /// Its maker's names.
+    /// Its maker's names, and whatever else it was heard to have.
     Named {
         catalogue: Catalogue,
+        /// Those that came since it was begun: what is known of before may have changed.
+        heard: BTreeSet<String>,
         /// How often each was read in vain.
-        tries: BTreeMap<&'static str, u8>,
+        tries: BTreeMap<String, u8>,
         /// Something that was read by its name was answered.
         answers_to_names: bool,
     },
@@ -57,7 +60,7 @@ pub enum List {
 
 impl List {
     pub fn named(catalogue: Catalogue) -> Self {
-        Self::Named { catalogue, tries: BTreeMap::new(), answers_to_names: false }
+        Self::Named { catalogue, heard: BTreeSet::new(), tries: BTreeMap::new(), answers_to_names: false }
     }
 
     pub fn counted() -> Self {
@@ -75,9 +78,10 @@ impl List {
     /// The gimbal told one, of whatever name and value; an index beyond the count says nothing of its place.
     pub fn handle_told(&mut self, name: Option<&str>, index: u16, told_count: u16) {
         match self {
-            Self::Named { tries, answers_to_names, .. } => {
-                let tries = name.and_then(|name| tries.get(name));
-                *answers_to_names |= tries.is_some_and(|tries| *tries <= TRIES_BY_NAME);
+            Self::Named { heard, tries, answers_to_names, .. } => {
+                let Some(name) = name else { return };
+                *answers_to_names |= tries.get(name).is_some_and(|tries| *tries <= TRIES_BY_NAME);
+                heard.insert(name.to_owned());
             }
             Self::Counted { count, heard, .. } => {
                 *count = told_count.min(MAX_NAMES as u16).max(*count);
@@ -88,14 +92,21 @@ impl List {
         }
     }
 
-    /// Those that did not come yet and may still.
-    pub fn missing(&self, has: &dyn Fn(&str) -> bool) -> VecDeque<Wanted> {
+    /// Those that did not come yet and may still, of a gimbal that is known to have these.
+    pub fn missing<V>(&self, known: &BTreeMap<String, V>) -> VecDeque<Wanted> {
         let is_open = |tries: Option<&u8>| tries.is_none_or(|tries| *tries < READ_TRIES);
         match self {
-            Self::Named { catalogue, tries, .. } => {
-                let open =
-                    catalogue(has).into_iter().filter(|known| !has(known.name) && is_open(tries.get(known.name)));
-                open.take(MAX_NAMES).map(Wanted::Named).collect()
+            Self::Named { catalogue, heard, tries, .. } => {
+                let listed = catalogue(&|name| known.contains_key(name));
+                let names: BTreeSet<&str> = listed.iter().map(|row| row.name).collect();
+                let others = known.keys().filter(|name| !names.contains(name.as_str()));
+                let listed = listed.iter().map(|row| (row.name, row.index));
+                listed
+                    .chain(others.map(|name| (name.as_str(), None)))
+                    .filter(|(name, _)| !heard.contains(*name) && is_open(tries.get(*name)))
+                    .take(MAX_NAMES)
+                    .map(|(name, index)| Wanted::Named { name: name.to_owned(), index })
+                    .collect()
             }
             Self::Counted { count, heard, tries } => {
                 let open = (0..*count).filter(|place| !heard.contains(place) && is_open(tries.get(place)));
@@ -105,32 +116,40 @@ impl List {
     }
 
     /// Whether one has come since it was found to be missing.
-    pub fn has(&self, wanted: Wanted, has: &dyn Fn(&str) -> bool) -> bool {
+    pub fn has_come(&self, wanted: &Wanted) -> bool {
         match (self, wanted) {
-            (_, Wanted::Named(known)) => has(known.name),
-            (Self::Counted { heard, .. }, Wanted::Place(place)) => heard.contains(&place),
-            (Self::Named { .. }, Wanted::Place(_)) => false,
+            (Self::Named { heard, .. }, Wanted::Named { name, .. }) => heard.contains(name),
+            (Self::Counted { heard, .. }, Wanted::Place(place)) => heard.contains(place),
+            (Self::Named { .. }, Wanted::Place(_)) | (Self::Counted { .. }, Wanted::Named { .. }) => false,
         }
     }
 
     /// Name and index of the question for one, which is put now.
     ///
     /// An index beside a name is what some gimbals go by, so it is −1 as long as the name is meant.
-    pub fn ask(&mut self, wanted: Wanted) -> (&'static str, i16) {
-        let index = |index: Option<u16>| index.and_then(|index| i16::try_from(index).ok()).unwrap_or(-1);
+    pub fn ask(&mut self, wanted: Wanted) -> (String, i16) {
+        let sent = |index: Option<u16>| index.and_then(|index| i16::try_from(index).ok()).unwrap_or(-1);
         match (self, wanted) {
-            (Self::Named { tries, answers_to_names, .. }, Wanted::Named(known)) => {
-                let tries = tries.entry(known.name).or_default();
+            (Self::Named { tries, answers_to_names, .. }, Wanted::Named { name, index }) => {
+                let tries = tries.entry(name.clone()).or_default();
                 let by_index = *tries >= TRIES_BY_NAME && !*answers_to_names;
                 *tries += 1;
-                (known.name, index(known.index.filter(|_| by_index)))
+                (name, sent(index.filter(|_| by_index)))
             }
             (Self::Counted { tries, .. }, Wanted::Place(place)) => {
                 *tries.entry(place).or_default() += 1;
-                ("", index(Some(place)))
+                (String::new(), sent(Some(place)))
             }
-            (_, Wanted::Named(known)) => (known.name, -1),
-            (_, Wanted::Place(place)) => ("", index(Some(place))),
+            (Self::Counted { .. }, Wanted::Named { name, .. }) => (name, -1),
+            (Self::Named { .. }, Wanted::Place(place)) => (String::new(), sent(Some(place))),
+        }
+    }
+
+    /// How many of those that are known have not come since it was begun, where its maker says what there is.
+    pub fn known_in_vain<V>(&self, known: &BTreeMap<String, V>) -> usize {
+        match self {
+            Self::Named { heard, .. } => known.keys().filter(|name| !heard.contains(*name)).count(),
+            Self::Counted { .. } => 0,
         }
     }
 

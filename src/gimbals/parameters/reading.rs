@@ -104,13 +104,17 @@ impl Parameters {
         }
     }
 
-    /// What does not come by its maker's list does not exist; where nothing is known of the gimbal, what it told has to do.
+    /// What never came by its maker's list does not exist, and what is known has to come again; where nothing is known of the
+    /// gimbal, what it told has to do.
     fn result_of_reading(&self) -> OperationResult {
-        let Some(count) = self.list.count() else { return Ok(()) };
         if !self.is_answered {
             return Err(self.silence());
         }
-        match self.missing().len() {
+        let (missing, count) = match self.list.count() {
+            Some(count) => (self.missing().len(), usize::from(count)),
+            None => (self.list.known_in_vain(&self.values), self.values.len()),
+        };
+        match missing {
             0 => Ok(()),
             missing => {
                 let text = format!("{missing} of its {count} parameters did not come in time");
@@ -120,7 +124,7 @@ impl Parameters {
     }
 
     fn missing(&self) -> VecDeque<Wanted> {
-        self.list.missing(&|name| self.values.contains_key(name))
+        self.list.missing(&self.values)
     }
 
     fn is_out_of_time(&self, now: Timestamp) -> bool {
@@ -147,14 +151,14 @@ impl Parameters {
             return;
         }
         while let Some(wanted) = queue.pop_front() {
-            if self.list.has(wanted, &|name| self.values.contains_key(name)) {
+            if self.list.has_come(&wanted) {
                 continue;
             }
             let pause = if queue.is_empty() { ROUND_PAUSE } else { self.list.spacing() };
             *latest = now + pause + READ_DELAY;
             self.timers.set(Timer::Read, now + pause);
             let (name, index) = self.list.ask(wanted);
-            self.send_read(name, index);
+            self.send_read(&name, index);
             return;
         }
         *latest = now + ROUND_PAUSE + READ_DELAY;

@@ -112,6 +112,19 @@ impl Line {
         self.gimbal.handle_frame(self.now, &frame, &mut self.outbox);
     }
 
+    /// Somebody sets one, and what the gimbal says to that is lost.
+    fn change_unheard(&mut self, name: &str, value: f32) {
+        let set = PARAM_SET_DATA {
+            param_value: value,
+            target_system: 1,
+            target_component: 154,
+            param_id: CharArray::from(name),
+            param_type: 4,
+        };
+        self.tell_gimbal(&encode_to_vec(GCS, 0, &set));
+        assert!(self.outbox.poll().is_some() && self.outbox.poll().is_none(), "it is told back");
+    }
+
     fn run_for(&mut self, millis: u64) {
         let end = self.now + Duration::from_millis(millis);
         self.settle();
@@ -358,6 +371,83 @@ fn a_refresh_is_answered_when_everything_was_read() {
     assert_eq!(line.sent.iter().filter(|(_, message)| is_list(message)).count(), 1);
     let done = |id| (21_010, ParameterOutput::Done { id, result: Ok(()) });
     assert_eq!(line.done, [(21_010, ParameterOutput::Settled), done(ID), done(OperationId(8))]);
+}
+
+/// "The daemon can read, cache and set a gimbal's parameters itself, with retry": what is known of before counts for nothing
+/// when they are read again, since it may have been changed with the maker's own program.
+#[test]
+fn a_refresh_reads_what_is_known_once_more() {
+    let mut line = Line::settled(&NAMES);
+    line.change_unheard("BETA", 99.0);
+    line.lost = |_, message| is_list(message);
+
+    line.parameters.refresh_for(line.now, ID);
+    line.run_for(10_000);
+
+    let read = |at: u64, name: &str| (at, name.to_owned(), -1);
+    assert_eq!(line.reads(), [read(23_000, "ALPHA"), read(23_010, "BETA"), read(23_020, "GAMMA")]);
+    assert_eq!(line.done.last(), Some(&(24_020, ParameterOutput::Done { id: ID, result: Ok(()) })));
+    assert_eq!(line.parameters.values().collect::<Vec<_>>(), [("ALPHA", 10.0), ("BETA", 99.0), ("GAMMA", 12.0)]);
+}
+
+/// What it told beyond its maker's names is read again by its name, too.
+#[test]
+fn a_refresh_reads_what_no_table_has() {
+    let mut line = Line::settled(&NAMES);
+    line.lost = |_, message| is_list(message);
+    let value = PARAM_VALUE_DATA {
+        param_value: 5.0,
+        param_count: 4,
+        param_index: 3,
+        param_id: CharArray::from("DELTA"),
+        param_type: 4,
+    };
+    line.hear(&encode_to_vec(GIMBAL, 0, &value));
+
+    line.parameters.refresh_for(line.now, ID);
+    line.run_for(20_000);
+
+    let of_delta: Vec<i16> =
+        line.reads().into_iter().filter(|(_, name, _)| name == "DELTA").map(|(_, _, index)| index).collect();
+    assert_eq!(of_delta, [-1; 5]);
+    let result = Err(OperationError::NoEffect("1 of its 4 parameters did not come in time".to_owned()));
+    assert_eq!(line.done.last().map(|(_, done)| done), Some(&ParameterOutput::Done { id: ID, result }));
+}
+
+/// Who asks for a reading of which nothing comes is told so, and what was known stays known.
+#[test]
+fn a_refresh_without_an_answer_is_not_done() {
+    for (names, error) in [(&NAMES[..], OperationError::NoAnswer), (&[], OperationError::NoParameters)] {
+        let mut line = Line::settled(names);
+        let known: Vec<(String, f64)> = line.parameters.by_name().into_iter().collect();
+        line.lost = |_, _| true;
+
+        line.parameters.refresh_for(line.now, ID);
+        line.run_for(20_000);
+
+        let results: Vec<_> = line.done.drain(..).map(|(_, done)| done).collect();
+        assert_eq!(results, [ParameterOutput::Settled, ParameterOutput::Done { id: ID, result: Err(error) }]);
+        assert_eq!(line.parameters.by_name().into_iter().collect::<Vec<_>>(), known);
+    }
+}
+
+/// A twentieth of all that is said is lost either way: what was changed meanwhile is known all the same.
+#[test]
+fn a_refresh_on_a_bad_line_is_whole() {
+    for seed in 1..=50 {
+        let mut line = Line::settled(&NAMES);
+        for (at, name) in NAMES.iter().enumerate() {
+            line.change_unheard(name, 20.0 + at as f32);
+        }
+        line.loss = Some((0.05, Random::new(seed)));
+
+        line.parameters.refresh_for(line.now, ID);
+        line.run_for(20_000);
+
+        assert_eq!(line.done.last().map(|(_, done)| done), Some(&ParameterOutput::Done { id: ID, result: Ok(()) }));
+        let values: Vec<f64> = line.parameters.values().map(|(_, value)| value).collect();
+        assert_eq!(values, [20.0, 21.0, 22.0], "{seed}");
+    }
 }
 
 /// Every queue has a bound: who asks for one more reading than are waited for is told so at once, and the others have theirs.
