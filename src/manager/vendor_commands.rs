@@ -12,6 +12,7 @@ use super::{GimbalManager, ManagerOutput, Sender, Surroundings, messages};
 use crate::channel::ChannelId;
 use crate::geometry::YawFrame;
 use crate::gimbals::operation::{Motors, Operation, OperationError, OperationId, ResetMode, Restart};
+use crate::gimbals::settings::Family;
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 use crate::wire::ids::{CommandResult, command};
@@ -42,10 +43,15 @@ impl GimbalManager {
         command: &Command,
         around: Surroundings<'_>,
     ) -> Result<Outcome, Refusal> {
-        if !self.capabilities.is_some_and(|capabilities| capabilities.operates) {
+        if !self.may_operate() {
             return Err(unsupported(command.number));
         }
-        let operation = match self.read_vendor_command(command)? {
+        let meaning = self.read_vendor_command(command)?;
+        // Who asks a gimbal that is not known yet may ask again.
+        if !self.is_known() {
+            self.steerable()?;
+        }
+        let operation = match meaning {
             Meaning::Operation(operation) => operation,
             Meaning::Hold(frame) => {
                 let voice = self.gate(now, sender.id, around)?;
@@ -68,6 +74,15 @@ impl GimbalManager {
         self.outputs.insert(before, ManagerOutput::Commanded { id, commander });
         self.commanded.push((sender.id, command.number));
         Ok(Outcome::InProgress)
+    }
+
+    /// Whether it has functions of its maker's own, or may turn out to have them.
+    fn may_operate(&self) -> bool {
+        match (self.capabilities, self.settings.family) {
+            (Some(capabilities), _) => capabilities.operates,
+            (None, Family::Gremsy | Family::Auto) => true,
+            (None, Family::MavlinkV1 | Family::MavlinkV2) => false,
+        }
     }
 
     fn read_vendor_command(&self, command: &Command) -> Result<Meaning, Refusal> {

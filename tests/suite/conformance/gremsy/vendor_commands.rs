@@ -6,7 +6,7 @@ use gimbald::wire::MavId;
 use gimbald::wire::dialect::COMMAND_ACK_DATA;
 
 use super::*;
-use crate::support::script::{ACCEPTED, DENIED, NAN, again, of, to};
+use crate::support::script::{ACCEPTED, DENIED, NAN, TEMPORARILY_REJECTED, UNSUPPORTED, again, of, to};
 use crate::support::world::{AUTOPILOT, GIMBAL};
 
 const IN_PROGRESS: u8 = 5;
@@ -28,7 +28,8 @@ fn answers(world: &mut World, places: Places, sender: MavId, number: u16, params
 }
 
 /// "Motors on and off, lock, follow, reset modes, reboot … MAVLink where the protocol has a way": each is begun, done by
-/// the gimbal, and answered when it is.
+/// the gimbal, and answered when it is. Client checklist E121, "no answer of ours ever has result IN_PROGRESS", is not kept for
+/// these alone: what they ask for takes seconds.
 #[test]
 #[rustfmt::skip]
 fn each_command_does_what_the_maker_says() {
@@ -94,6 +95,54 @@ fn item_138_a_restart_that_names_no_gimbal_restarts_nothing() {
         assert_eq!(answers(&mut world, places, GCS, number, &params), [DENIED], "{number} {params:?}");
     }
     assert_eq!(orders(&mut world, places), (vec![], vec![]));
+}
+
+/// "TEMPORARILY_REJECTED: it may work later: no gimbal yet, one that starts" (`docs/gimbal-manager.md`). A gimbal that is not there yet, or starts, is not known
+/// to have no such functions; of one that is known to be no Gremsy they are UNSUPPORTED at once.
+#[test]
+#[rustfmt::skip]
+fn who_asks_before_it_is_known_may_ask_again() {
+    let motors = command_long(MANAGER, 31010, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+    let lock = command_long(MANAGER, 31011, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+    let reset = command_long(MANAGER, 31011, &[0.0, 0.0, 0.0, 0.0, 0.0, 3.0, 4.0]);
+    let reboot = command_long(MANAGER, 246, &[0.0, 0.0, 1.0, 154.0, 0.0, 0.0, 0.0]);
+    let no_mode = command_long(MANAGER, 31011, &[0.0; 7]);
+    let others = command_long(MANAGER, 246, &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    for (family,           known_after_s, [before, starting, known]) in [
+        (Family::Gremsy,   12,            [TEMPORARILY_REJECTED, TEMPORARILY_REJECTED, IN_PROGRESS]),
+        (Family::Auto,     20,            [TEMPORARILY_REJECTED, TEMPORARILY_REJECTED, IN_PROGRESS]),
+        (Family::MavlinkV2, 12,           [UNSUPPORTED, UNSUPPORTED, UNSUPPORTED]),
+    ] {
+        let gimbal = GimbalSettings { family, ..GimbalSettings::found("camera".to_owned()) };
+        let (mut world, places) = World::empty(Settings { gimbals: vec![gimbal], ..three_links() });
+        world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
+        run(&mut world, places, SECOND);
+        for command in [&motors, &lock, &reset] {
+            assert_eq!(world.result_of(places.ground, GCS, command), Some(before), "{family:?} {command:?}");
+        }
+        assert_eq!(world.result_of(places.ground, GCS, &reboot), Some(DENIED), "it names none that is there");
+
+        world.install(places.gimbal, Device::new(world.now, device(Generation::V2)));
+        for _ in 0..100 {
+            if seen(&world).state == "searching" {
+                run(&mut world, places, SECOND / 10);
+            }
+        }
+        assert_eq!(seen(&world).state, "alive", "{family:?}");
+        for command in [&motors, &lock, &reset] {
+            assert_eq!(world.result_of(places.ground, GCS, command), Some(starting), "{family:?} {command:?}");
+        }
+        let of_reboot = if family == Family::MavlinkV2 { DENIED } else { starting };
+        assert_eq!(world.result_of(places.ground, GCS, &reboot), Some(of_reboot), "{family:?}");
+        for command in [&no_mode, &others] {
+            let wrong = if family == Family::MavlinkV2 && *command == no_mode { UNSUPPORTED } else { DENIED };
+            assert_eq!(world.result_of(places.ground, GCS, command), Some(wrong), "{family:?} {command:?}");
+        }
+        assert_eq!(orders(&mut world, places), (vec![], vec![]), "{family:?}");
+
+        run(&mut world, places, known_after_s * SECOND);
+        assert_eq!(world.result_of(places.ground, GCS, &reset), Some(known), "{family:?}");
+    }
 }
 
 /// "Dangerous ones (motors off, reboot) need … the holder's right"; all of them pass the gate.
