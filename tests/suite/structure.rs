@@ -15,7 +15,7 @@ const PURE: [(&str, &[&str]); 11] = [
     ("gimbals", &["vehicle", "geometry", "wire", "timestamp", "timers"]),
     ("manager", &["channel", "gimbals", "vehicle", "geometry", "wire", "timestamp", "timers"]),
     ("bridge", &["manager", "gimbals", "router", "vehicle", "geometry", "wire", "channel", "timestamp", "timers"]),
-    ("sim/vehicle", &["sim", "gimbals", "vehicle", "geometry", "wire", "timestamp", "timers"]),
+    ("sim/vehicle", &["sim", "vehicle", "geometry", "wire", "timestamp", "timers"]),
 ];
 
 /// "pure: no tokio, no `std::net`, no `Instant`, no `SystemTime`".

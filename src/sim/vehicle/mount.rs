@@ -8,13 +8,12 @@ use std::time::Duration;
 
 use super::{HOME, Vehicle};
 use crate::geometry::{Angle, AngularRate, Attitude, GimbalAngles, Position, VehicleFrame};
-use crate::gimbals::mavlink_v2::packet;
 use crate::sim::command::Command;
 use crate::timestamp::Timestamp;
 use crate::wire::dialect::{
-    CharArray, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA,
-    GIMBAL_MANAGER_INFORMATION_DATA, GIMBAL_MANAGER_SET_PITCHYAW_DATA, GIMBAL_MANAGER_STATUS_DATA, HEARTBEAT_DATA,
-    STATUSTEXT_DATA,
+    COMMAND_LONG_DATA, CharArray, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA,
+    GIMBAL_DEVICE_SET_ATTITUDE_DATA, GIMBAL_MANAGER_INFORMATION_DATA, GIMBAL_MANAGER_SET_PITCHYAW_DATA,
+    GIMBAL_MANAGER_STATUS_DATA, HEARTBEAT_DATA, STATUSTEXT_DATA,
 };
 use crate::wire::ids::{
     CapFlags, CommandResult, GimbalFlags, command, component, mav_type, message, mount_mode, severity,
@@ -128,7 +127,20 @@ impl Vehicle {
         if gave_up {
             return;
         }
-        self.line.outbox.send(&packet::request_of(device, message::GIMBAL_DEVICE_INFORMATION));
+        // Written out: what an autopilot says is not made by what the daemon says it with.
+        self.line.outbox.send(&COMMAND_LONG_DATA {
+            param1: message::GIMBAL_DEVICE_INFORMATION as f32,
+            param2: 0.0,
+            param3: 0.0,
+            param4: 0.0,
+            param5: 0.0,
+            param6: 0.0,
+            param7: 0.0,
+            command: command::REQUEST_MESSAGE,
+            target_system: device.system,
+            target_component: device.component,
+            confirmation: 0,
+        });
     }
 
     /// Obeys whoever asks; `None` for what is no business of a mount.
