@@ -259,6 +259,9 @@ impl GimbalManager {
             }
         }
         if self.state != DeviceState::Alive {
+            if self.is_shut_down {
+                self.steerable().map(drop).map_err(|refusal| self.not_done(refusal))?;
+            }
             return Err(NotDone::Operation(OperationError::NotThere));
         }
         if operation.needs_control() {

@@ -6,12 +6,12 @@ use std::time::Duration;
 use gimbald::actions::Action;
 use gimbald::bridge::settings::Settings;
 use gimbald::gimbals::gremsy::sim::{Device, DeviceSettings, Generation};
-use gimbald::gimbals::operation::OperationError;
 use gimbald::gimbals::settings::{Family, GimbalSettings};
 use gimbald::manager::asked::{Answer, NotDone};
 use gimbald::manager::request::Refusal;
 use gimbald::sim::vehicle::{Vehicle, VehicleSettings};
 use gimbald::timestamp::Timestamp;
+use gimbald::wire::ids::CommandResult;
 use serde_json::Value;
 
 use crate::support::world::{Places, World, three_links};
@@ -189,8 +189,17 @@ fn a_gremsy_is_restarted_and_shut_down() {
         world.run_for(10 * SECOND);
         assert_eq!(world.snapshot().gimbals[0].state, "lost", "{generation:?}");
         take(&mut world);
-        let motors = ask(&mut world, "motors", None, r#"{"state": "on"}"#);
-        assert_eq!(motors, Err(NotDone::Operation(OperationError::NotThere)));
+        // "the gimbal was shut down; switch it on", whatever is asked of it.
+        let refusal = Refusal { result: CommandResult::Failed, reason: "gimbal_shut_down" };
+        for (command, body) in [
+            ("motors", r#"{"state": "on"}"#),
+            ("reboot", r#"{"confirm": "reboot"}"#),
+            ("refresh-parameters", ""),
+            ("point", r#"{"pitch_deg": 0}"#),
+        ] {
+            let answer = ask(&mut world, command, None, body);
+            assert_eq!(answer, Err(NotDone::Refused { refusal, holder: None }), "{generation:?} {command}");
+        }
     }
 }
 
