@@ -30,7 +30,7 @@ pub enum Form {
 }
 
 impl Command {
-    pub fn long(frame: &Frame<'_>, message: &COMMAND_LONG_DATA) -> Self {
+    pub(super) fn long(frame: &Frame<'_>, message: &COMMAND_LONG_DATA) -> Self {
         Self {
             number: message.command,
             target: frame.target(),
@@ -48,7 +48,7 @@ impl Command {
         }
     }
 
-    pub fn int(frame: &Frame<'_>, message: &COMMAND_INT_DATA) -> Self {
+    pub(super) fn int(frame: &Frame<'_>, message: &COMMAND_INT_DATA) -> Self {
         Self {
             number: message.command,
             target: frame.target(),

@@ -45,7 +45,7 @@ pub enum DemandKind {
 
 impl Demand {
     /// What no gimbal can do, whatever its capabilities.
-    pub fn check(&self) -> Result<(), Refusal> {
+    pub(super) fn check(&self) -> Result<(), Refusal> {
         if self.flags.contains(GimbalFlags::YAW_IN_VEHICLE_FRAME | GimbalFlags::YAW_IN_EARTH_FRAME) {
             return Err(Refusal::denied("both_yaw_frames"));
         }
