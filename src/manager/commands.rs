@@ -1,6 +1,6 @@
 //! `COMMAND_LONG` and `COMMAND_INT` for a gimbal manager, each with its one answer.
 //!
-//! What a command is about is in files of its own: [`super::inquiries`] (512, 511, 510), [`super::roi`] (195, 197),
+//! What a command is about is in files of its own: [`super::inquiries`] (512, 511, 510), [`super::roi`] (195, 197, 201),
 //! [`super::mount`] (204, 205, 220), [`super::vendor_commands`] (31010, 31011, 246). Those that we do not know are refused
 //! by name to whoever addressed exactly us, and are somebody else's business when everybody was asked.
 
