@@ -188,7 +188,7 @@ fn the_unit_says_what_the_daemon_relies_on() {
         "SupplementaryGroups=dialout",
         "StateDirectory=gimbald",
         "RuntimeDirectory=gimbald",
-        "RuntimeDirectoryPreserve=restart",
+        "RuntimeDirectoryPreserve=yes",
         "CPUSchedulingPolicy=fifo",
         "CPUSchedulingResetOnFork=yes",
         "RestrictAddressFamilies=AF_INET AF_INET6 AF_UNIX",
