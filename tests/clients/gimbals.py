@@ -20,6 +20,10 @@ class Gimbal(NamedTuple):
     status_yaw: str = "yaw_north"
     # How long its farthest way takes, seconds.
     arrives_within: float = 6
+    # Where it looks when it is retracted, degrees, pitch and yaw from the nose; None for one that is left without motors.
+    stowed: tuple = (0, 0)
+    # Its GIMBAL_DEVICE_ATTITUDE_STATUS shows then that it is retracted.
+    tells_retract: bool = True
     # More of its `[[gimbal]]` entry.
     entry: str = ""
 
@@ -37,14 +41,15 @@ class Gimbal(NamedTuple):
         return f'[[gimbal]]\nname = "camera"\nlink = "gimbal"\nfamily = "{self.family}"\n{self.entry}' if self.family else ""
 
 
-def gremsy(generation):
+def gremsy(generation, retract_allowed=False):
     options = ("--family", "gremsy", "--gremsy-generation", generation)
     # Only the one that is no v2 device needs an id of its own.
     device = {"v1": 1, "v2": 154}[generation]
     # The second generation speaks for itself: from North while yaw is locked, else from the nose.
     status_yaw = {"v1": "yaw_north", "v2": None}[generation]
+    entry = "retract_allowed = true\n" if retract_allowed else "stow_pitch_deg = -40\nstow_yaw_deg = 25\n"
     return Gimbal(
-        f"gremsy_{generation}",
+        f"gremsy_{generation}" + ("_motors_off" if retract_allowed else ""),
         options,
         "gremsy",
         (191, device),
@@ -53,8 +58,10 @@ def gremsy(generation):
         status_yaw=status_yaw,
         # It turns by 30 degrees per second, and by 320 to either side.
         arrives_within=25,
-        # The second generation shows the flag only while its motors are off.
-        entry={"v1": "", "v2": "retract_allowed = true\n"}[generation],
+        stowed=None if retract_allowed else (-40, 25),
+        # The second generation speaks for itself, and shows the flag only while its motors are off.
+        tells_retract=generation == "v1" or retract_allowed,
+        entry=entry,
     )
 
 
@@ -64,7 +71,8 @@ MAVLINK_V2 = Gimbal("mavlink_v2", ("--frames", "strict"))
 V1_OPTIONS = ("--family", "mavlink_v1", "--yaw-range", "350")
 MAVLINK_V1 = Gimbal("mavlink_v1", V1_OPTIONS, "mavlink_v1", (191, 1), "", "MAVLink v1", 2.5, "yaw_vehicle")
 
-ALL = {gimbal.name: gimbal for gimbal in (MAVLINK_V2, MAVLINK_V1, gremsy("v1"), gremsy("v2"))}
+GREMSYS = (gremsy("v1"), gremsy("v2"), gremsy("v2", retract_allowed=True))
+ALL = {gimbal.name: gimbal for gimbal in (MAVLINK_V2, MAVLINK_V1, *GREMSYS)}
 
 
 def chosen():

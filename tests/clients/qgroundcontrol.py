@@ -70,6 +70,12 @@ class Operator:
         # As a component that beats; and once more as the manager of a gimbal, if it has heard of that at the same time, or
         # as it beat again while another component's answer was waited for.
         expect(1 <= len(asked) <= 2, f"it had to ask {len(asked)} times")
+
+        def answers():
+            frames = self.wire.daemon_said()
+            return [frame for frame in frames if (frame.name, frame.source) == ("GIMBAL_MANAGER_INFORMATION", MANAGER)]
+
+        wait_for("the answer to each question", lambda: len(answers()) >= len(asked), 1)
         return f"{took:.2f} s after it began to look for gimbals"
 
     def acquires_and_releases(self):
@@ -146,7 +152,14 @@ class Operator:
         client.tilt_90()
         self.camera.wait_at(pitch=-90)
         client.retract()
-        wait_for("the label 'Retracted'", lambda: active.label == "Retracted", 1)
+        kind = self.rig.kind
+        if kind.tells_retract:
+            wait_for("the label 'Retracted'", lambda: active.label == "Retracted", 1)
+        if kind.stowed:
+            pitch, yaw = kind.stowed
+            self.camera.wait_at(pitch=pitch, yaw_vehicle=yaw)
+        expect(active.label == ("Retracted" if kind.tells_retract else "Yaw follow"), f"it is labelled {active.label}")
+        expect("retract" in self.rig.gimbal()["flags"], "the page does not say that it is retracted")
         self.center()
         wait_for("the label 'Yaw follow'", lambda: active.label == "Yaw follow", 1)
 
