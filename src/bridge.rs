@@ -181,9 +181,9 @@ enum Timer {
 impl Bridge {
     pub fn new(now: Timestamp, settings: Settings) -> Self {
         // A gimbal that an earlier run left turning may listen to the system alone that told it to.
-        let left_turning = || settings.left_turning.iter().find_map(|line| LeftTurning::read(line)?.device);
-        let stored = settings.stored_system_id.or_else(|| left_turning().map(|device| device.system));
-        let identity = Identity::new(now, settings.system_id, stored);
+        let left_turning = settings.left_turning.iter().rev().find_map(|line| LeftTurning::read(line)?.device);
+        let listens_to = left_turning.map(|device| device.system);
+        let identity = Identity::new(now, settings.system_id, settings.stored_system_id, listens_to);
         let mut bridge = Self {
             started: now,
             channels: Channels::new(settings.links.clone()),

@@ -397,8 +397,13 @@ impl GimbalManager {
         }
         if let Some(capabilities) = self.capabilities.filter(|_| self.pauses.is_empty() && self.readiness.is_ready()) {
             let situation = self.situation(now, &capabilities, around);
+            let is_steered = self.tracking.mode().is_some();
             if let Some(setpoint) = self.tracking.steer(now, &situation) {
                 self.outputs.push_back(ManagerOutput::Steer(setpoint));
+            }
+            if is_steered && self.tracking.mode().is_none() {
+                // Radio control has it now; the rotation may be what it goes on with when that lets go.
+                self.leave_turning();
             }
         }
         self.note_rotation(now);

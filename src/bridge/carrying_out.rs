@@ -45,7 +45,8 @@ impl Bridge {
             return;
         }
         let gimbals = noted.collect();
-        let lines = turning.map(|(_, gimbal)| LeftTurning::of(gimbal)).chain(awaited.iter().cloned());
+        // Where there are more than the next start takes, those that turn now come last and are taken.
+        let lines = awaited.iter().cloned().chain(turning.map(|(_, gimbal)| LeftTurning::of(gimbal)));
         let lines: String = lines.map(|left| format!("{left}\n")).collect();
         self.turning = NotedTurning { gimbals, awaited: awaited.revision() };
         self.outbox.push_turning(lines);

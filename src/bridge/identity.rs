@@ -21,6 +21,9 @@ const AUTOPILOT_LOST: Duration = Duration::from_secs(5);
 /// it was restarted under another one, and nobody will see the vehicle under the former any more.
 const GONE_FOR_GOOD: Duration = Duration::from_secs(30);
 
+/// A gimbal that was told to stop for so long under an id without autopilot does not listen to it, or hears nothing.
+const TOLD_IN_VAIN: Duration = Duration::from_secs(60);
+
 /// What stands against another system id.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Ties {
@@ -47,12 +50,14 @@ pub struct Identity {
 }
 
 impl Identity {
-    pub fn new(now: Timestamp, wanted: SystemId, stored: Option<u8>) -> Self {
-        let (fixed, system) = match wanted {
-            SystemId::Fixed(system) => (true, Some(system)),
-            SystemId::Auto => (false, stored.filter(|system| *system != 0)),
+    /// `stored`: of an earlier run. `assumed`: to begin under where nothing is stored, until an autopilot is heard.
+    pub fn new(now: Timestamp, wanted: SystemId, stored: Option<u8>, assumed: Option<u8>) -> Self {
+        let [stored, assumed] = [stored, assumed].map(|id| id.filter(|system| *system != 0));
+        let (fixed, system, bootstrap) = match wanted {
+            SystemId::Fixed(system) => (true, Some(system), false),
+            SystemId::Auto => (false, stored.or(assumed), stored.is_none() && assumed.is_some()),
         };
-        Self { started: now, is_waiting: false, fixed, system, bootstrap: false, autopilots: Vec::new() }
+        Self { started: now, is_waiting: false, fixed, system, bootstrap, autopilots: Vec::new() }
     }
 
     /// Our system id, `None` until it is settled.
@@ -87,9 +92,14 @@ impl Identity {
 
     /// Whether the autopilot that gave us our id does not come back.
     fn is_orphaned(&self, now: Timestamp) -> bool {
+        !self.bootstrap && self.is_silent_for(now, GONE_FOR_GOOD)
+    }
+
+    /// Whether no autopilot with our id was heard for so long.
+    fn is_silent_for(&self, now: Timestamp, duration: Duration) -> bool {
         let heard =
             |ours| self.autopilots.iter().find(|(id, ..)| *id == ours).map_or(self.started, |(.., latest)| *latest);
-        !self.bootstrap && self.system.is_some_and(|ours| now.since(heard(ours)) >= GONE_FOR_GOOD)
+        self.system.is_some_and(|ours| now.since(heard(ours)) >= duration)
     }
 
     /// An autopilot of `system` beat on an autopilot link.
@@ -150,7 +160,10 @@ impl Identity {
                     self.settle(FALLBACK_SYSTEM_ID, true);
                 }
             }
-            Some(ours) if !ties.is_turning && (!ties.is_held || self.is_orphaned(now)) => {
+            Some(ours)
+                if (!ties.is_turning || self.is_silent_for(now, TOLD_IN_VAIN))
+                    && (!ties.is_held || self.is_orphaned(now)) =>
+            {
                 // Another id only when its autopilot alone has been heard for the whole window.
                 let other = self.autopilots.iter().find(|(id, first, latest)| {
                     Some(*id) == only && now.since(*first) >= WINDOW && now.since(*latest) < AUTOPILOT_LOST
@@ -238,6 +251,40 @@ mod tests {
         assert_eq!(identity.system(), Some(8));
     }
 
+    /// "Our system id stays while one may be turning, which may listen to that id alone", for as long as that can help: nobody
+    /// sees the managers of a vehicle that has another id.
+    #[test]
+    fn a_gimbal_that_does_not_hear_that_it_is_to_stop_binds_for_a_minute() {
+        let mut identity = auto();
+        for second in 0..=5 {
+            identity.handle_autopilot(secs(second), 7);
+            identity.update(secs(second), FREE);
+        }
+        let turning = Ties { is_turning: true, ..FREE };
+        for second in 6..=64 {
+            identity.handle_autopilot(secs(second), 8);
+            assert!(!identity.update(secs(second), turning), "after {second} s");
+        }
+        identity.handle_autopilot(secs(65), 8);
+        assert!(identity.update(secs(65), turning));
+        assert_eq!(identity.system(), Some(8));
+    }
+
+    /// What an earlier run's gimbal listens to is begun under, and proves nothing.
+    #[test]
+    fn an_assumed_id_is_used_at_once_and_gives_way_to_an_autopilot() {
+        let mut identity = Identity::new(Timestamp::ZERO, SystemId::Auto, None, Some(7));
+        assert_eq!((identity.system(), identity.is_bootstrap()), (Some(7), true));
+        for second in 1..=4 {
+            identity.handle_autopilot(secs(second), 8);
+            assert!(!identity.update(secs(second), Ties { is_turning: true, ..FREE }));
+        }
+        assert!(identity.update(secs(4), FREE));
+        assert_eq!((identity.system(), identity.is_bootstrap()), (Some(8), false));
+        let stored = Identity::new(Timestamp::ZERO, SystemId::Auto, Some(9), Some(7));
+        assert_eq!((stored.system(), stored.is_bootstrap()), (Some(9), false));
+    }
+
     /// An id that is another vehicle's would make us a part of it.
     #[test]
     fn the_fallback_is_not_taken_from_another_vehicle() {
@@ -253,7 +300,7 @@ mod tests {
     /// D19: a stored id is used at once; the window only confirms it.
     #[test]
     fn a_stored_id_is_used_at_once() {
-        let mut identity = Identity::new(Timestamp::ZERO, SystemId::Auto, Some(7));
+        let mut identity = Identity::new(Timestamp::ZERO, SystemId::Auto, Some(7), None);
         assert_eq!(identity.system(), Some(7));
         identity.handle_autopilot(secs(1), 7);
         assert!(!identity.update(secs(4), FREE));
@@ -262,14 +309,14 @@ mod tests {
 
     #[test]
     fn a_fixed_id_never_changes() {
-        let mut identity = Identity::new(Timestamp::ZERO, SystemId::Fixed(42), Some(7));
+        let mut identity = Identity::new(Timestamp::ZERO, SystemId::Fixed(42), Some(7), None);
         identity.handle_autopilot(secs(1), 7);
         assert!(!identity.update(secs(20), FREE));
         assert_eq!((identity.system(), identity.poll_timeout()), (Some(42), None));
     }
 
     fn auto() -> Identity {
-        Identity::new(Timestamp::ZERO, SystemId::Auto, None)
+        Identity::new(Timestamp::ZERO, SystemId::Auto, None, None)
     }
 
     fn secs(secs: u64) -> Timestamp {

@@ -11,6 +11,8 @@ mod left_turning;
 pub use adoption::{Hearing, NotAdopted, Place, Renamed};
 pub use left_turning::LeftTurning;
 
+use std::time::Duration;
+
 use super::LinkIndex;
 use super::settings::Settings;
 use crate::channel::{ChannelId, ChannelSet};
@@ -43,8 +45,8 @@ pub struct Gimbal {
     elsewhere: Option<LinkIndex>,
     /// When it turned out that two speak under its id.
     has_twin: Option<Timestamp>,
-    /// The device that may be this one, and was turning.
-    stopped_for: Option<MavId>,
+    /// The devices that may be this one, and were turning.
+    stopped_for: Vec<Option<MavId>>,
     /// The manager's component id.
     pub component: u8,
     /// It has an entry in the configuration, and is missed when it is not there.
@@ -71,7 +73,7 @@ impl Gimbal {
             heard: Timestamp::ZERO,
             elsewhere: None,
             has_twin: None,
-            stopped_for: None,
+            stopped_for: Vec::new(),
             component,
             configured,
         }
@@ -103,6 +105,11 @@ impl Gimbal {
     /// Whether it is told of: a place that waits for a gimbal is not, unless the configuration names it.
     pub fn is_shown(&self) -> bool {
         self.configured || self.manager.device().is_some()
+    }
+
+    /// Whether it has had its device for so long.
+    pub fn has_device_for(&self, now: Timestamp, duration: Duration) -> bool {
+        self.adopted.is_some() && now.since(self.adopted_at) >= duration
     }
 
     /// Whether its manager sends heartbeats: 191 always does, others from when their gimbal is known.

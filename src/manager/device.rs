@@ -94,9 +94,14 @@ impl GimbalManager {
                 }
                 self.status = Some((now, status));
                 self.told_attitude = Some(now);
-                if let (Some(_), Some(capabilities)) = (status.heading, self.capabilities) {
+                if let Some(capabilities) = self.capabilities {
                     let situation = self.situation(now, &capabilities, around);
-                    self.tracking.handle_turned(now, &situation);
+                    if status.heading.is_some() {
+                        self.tracking.handle_turned(now, &situation);
+                    }
+                    if !situation.radio_control_has_it() {
+                        self.stop_what_radio_control_left(now);
+                    }
                 }
             }
             Report::Fault(what) => self.tell(Event::Fault { what }),

@@ -40,7 +40,8 @@ impl GimbalManager {
 
     /// It may be one that was told to turn under another id. Whoever steers it tells it something else anyway.
     pub fn stop_unless_steered(&mut self, now: Timestamp) {
-        if self.tracking.mode().is_none() && self.rotation.is_none() {
+        let is_steered = self.tracking.mode().is_some() || self.tracking.is_handed_over();
+        if !is_steered && self.rotation.is_none() {
             self.stop_when_heard();
             self.stop_what_was_left_turning(now);
         }
@@ -76,14 +77,26 @@ impl GimbalManager {
     /// Nobody can be told what to do before it is known, but to stop.
     pub(super) fn stop_what_was_left_turning(&mut self, now: Timestamp) {
         let is_steerable = self.steerable().is_ok();
+        // One that is turned for by us, to an angle, has nothing that could go on; and where it looks is not known.
+        let would_move = self.capabilities.is_some_and(|capabilities| !capabilities.turns)
+            && self.status.is_none_or(|(_, status)| status.is_assumed);
         let Some(rotation) = self.rotation.as_mut().filter(|rotation| rotation.is_left) else { return };
-        if is_steerable {
+        if is_steerable && would_move {
+            self.forget_rotation();
+        } else if is_steerable {
             rotation.is_left = false;
             let turning = rotation.turning;
             self.tracking.halt(now, turning);
         } else if self.is_heard {
             self.stop_unknown = Some(now + STOP_UNKNOWN_EVERY);
             self.stop_at_once();
+        }
+    }
+
+    /// It is not, or not any more, in the hands of its radio control, which took it while it turned.
+    pub(super) fn stop_what_radio_control_left(&mut self, now: Timestamp) {
+        if self.steerable().is_ok() {
+            self.stop_what_was_left_turning(now);
         }
     }
 

@@ -72,7 +72,7 @@ impl Gimbal {
 
     /// Whether its device is there, or was not long ago.
     pub fn may_come_back(&self, now: Timestamp) -> bool {
-        !self.is_lost() || now.since(self.heard) < MAY_COME_BACK_WITHIN
+        self.adopted.is_some() && (!self.is_lost() || now.since(self.heard) < MAY_COME_BACK_WITHIN)
     }
 
     /// Whether nobody waits for its device to come back.
@@ -138,15 +138,21 @@ impl Roster {
         self.waiting.retain(|(waiting, _)| *waiting != device);
         // It is another one, perhaps, unless it has only taken the vehicle's system id.
         let came_home = |known: MavId| known.component == device.component && device.system == ours;
-        if self.gimbals[at].adopted.is_some_and(|known| !came_home(known)) {
+        let is_another = self.gimbals[at].adopted.is_some_and(|known| !came_home(known));
+        if is_another {
             self.await_if_turning(at);
         }
         let gimbal = &mut self.gimbals[at];
+        let (may_be_turning, stops_as) = (gimbal.may_be_turning() && !is_another, gimbal.driver.stops_as());
         gimbal.driver.adopt(now, device);
+        if may_be_turning {
+            // What its driver knew of that is gone.
+            gimbal.stop_when_heard(stops_as);
+        }
         gimbal.adopted = Some(device);
         gimbal.channel = Some(place.channel);
         (gimbal.link, gimbal.adopted_at, gimbal.heard) = (place.link, now, now);
-        (gimbal.elsewhere, gimbal.has_twin, gimbal.stopped_for) = (None, None, None);
+        (gimbal.elsewhere, gimbal.has_twin, gimbal.stopped_for) = (None, None, Vec::new());
         self.stop_if_left_turning(at, device);
         Ok(&mut self.gimbals[at])
     }

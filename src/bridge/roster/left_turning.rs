@@ -2,9 +2,8 @@
 //! has taken.
 //!
 //! A line is kept of each for the next start, its fields between tabs: the name, which device it was, and the family whose
-//! words stop it where only we know. A name without a device, of
-//! a gimbal that was not heard, or of an older version, means whoever has that name; a device is stopped whatever it is
-//! called by then, and when it is not heard, who has its name.
+//! words stop it where only we know. A name without a device, of a gimbal that was not heard, or of an older version, means
+//! whoever has that name; a device is stopped whatever it is called by then, and when it is not heard, who has its name.
 
 use std::fmt;
 use std::time::Duration;
@@ -123,16 +122,32 @@ impl Awaited {
 
 impl Gimbal {
     /// It was left turning by an earlier run, or under another id.
-    fn stop_when_heard(&mut self, stops_as: Option<Family>) {
+    pub(super) fn stop_when_heard(&mut self, stops_as: Option<Family>) {
         if let Some(family) = stops_as {
             self.driver.stop_as(family);
         }
         self.manager.stop_when_heard();
     }
 
-    /// To a plain v1 gimbal the word that stops a Gremsy is an angle: only who is known to be one is told it for another.
+    /// To a plain v1 gimbal the word that stops a Gremsy is an angle: only who is known to be one is told it for another. A
+    /// v2 device it cannot be, and has no rotation that could have been left.
     fn may_be_stopped_as(&self, family: Option<Family>) -> bool {
-        family.is_none_or(|family| self.driver.family() == family)
+        match family {
+            Some(family) => self.driver.family() == family,
+            None => self.driver.family() != Family::MavlinkV1,
+        }
+    }
+
+    /// Whether it was not stopped yet in the stead of `device`; from now on it was.
+    fn is_not_stopped_for(&mut self, device: Option<MavId>) -> bool {
+        let is_new = !self.stopped_for.contains(&device);
+        if is_new {
+            if self.stopped_for.len() >= MAX_LEFT {
+                self.stopped_for.remove(0);
+            }
+            self.stopped_for.push(device);
+        }
+        is_new
     }
 }
 
@@ -182,8 +197,7 @@ impl Roster {
             for gimbal in &mut self.gimbals {
                 let is_successor = gimbal.adopted.is_some() && gimbal.link == link && gimbal.adopted_at > heard;
                 let may_be_it = is_successor && gimbal.may_be_stopped_as(stops_as);
-                if may_be_it && !gimbal.is_lost() && gimbal.stopped_for != device {
-                    gimbal.stopped_for = device;
+                if may_be_it && !gimbal.is_lost() && gimbal.is_not_stopped_for(device) {
                     if let Some(family) = stops_as {
                         gimbal.driver.stop_as(family);
                     }
@@ -202,10 +216,8 @@ impl Roster {
             let Some(left) = self.left_turning.iter().find(|left| left.name == *name && left.device.is_some()) else {
                 continue;
             };
-            let is_there =
-                gimbal.adopted.is_some() && !gimbal.is_lost() && now.since(gimbal.adopted_at) >= RENAMED_AFTER;
-            if is_there && gimbal.stopped_for != left.device && gimbal.may_be_stopped_as(left.stops_as) {
-                gimbal.stopped_for = left.device;
+            let is_there = !gimbal.is_lost() && gimbal.has_device_for(now, RENAMED_AFTER);
+            if is_there && gimbal.may_be_stopped_as(left.stops_as) && gimbal.is_not_stopped_for(left.device) {
                 if let Some(family) = left.stops_as {
                     gimbal.driver.stop_as(family);
                 }
@@ -249,7 +261,9 @@ mod tests {
     fn no_more_are_waited_for_than_there_is_room() {
         let lines: Vec<String> = (0..100).map(|number| format!("gimbal-{number}")).collect();
         let mut awaited = Awaited::read(&lines);
-        assert_eq!(awaited.iter().count(), MAX_LEFT);
+        let names: Vec<&str> = awaited.iter().map(|left| left.name.as_str()).collect();
+        // Those that turned when it was written are the last.
+        assert_eq!((names.len(), names[0], names[MAX_LEFT - 1]), (MAX_LEFT, "gimbal-36", "gimbal-99"));
         awaited.push(LeftTurning { name: "camera".to_owned(), device: None, stops_as: None });
         assert_eq!(awaited.iter().count(), MAX_LEFT);
         assert!(awaited.take(|left| left.name == "camera").is_some());

@@ -346,6 +346,13 @@ impl GimbalDriver for GremsyDriver {
         self.go_on(now);
     }
 
+    /// A stop of ours is believed when it is acknowledged, or was looked at for a while, however early its protocol is known.
+    fn stop_as(&mut self, _family: Family) {
+        if self.search.decided() != Some(Generation::V2) {
+            self.mount.assume_turning();
+        }
+    }
+
     fn handle_vehicle_heading(&mut self, heading: Option<Angle>) {
         self.vehicle_heading = heading;
     }

@@ -23,7 +23,7 @@ pub struct Situation<'a> {
 impl Situation<'_> {
     /// Whether the gimbal says that its own radio control has it and nobody else. Only one with such an input is
     /// believed: others use that bit for something of their own.
-    pub(super) fn radio_control_has_it(&self) -> bool {
+    pub(in crate::manager) fn radio_control_has_it(&self) -> bool {
         self.capabilities.flags.contains(CapFlags::HAS_RC_INPUTS)
             && self.measured.is_some_and(|status| status.flags.contains(GimbalFlags::RC_EXCLUSIVE))
     }

@@ -15,6 +15,7 @@ use super::world::GIMBAL;
 #[derive(Clone, Debug, Default)]
 pub struct Cable {
     is_cut: Rc<Cell<bool>>,
+    is_deaf: Rc<Cell<bool>>,
     /// What the gimbal at its end, which is [`GIMBAL`], is called on this side.
     alias: Rc<Cell<Option<MavId>>>,
 }
@@ -25,8 +26,14 @@ impl Cable {
         self.is_cut.set(true);
     }
 
+    /// The gimbal is heard, and hears nothing.
+    pub fn cut_towards_gimbal(&self) {
+        self.is_deaf.set(true);
+    }
+
     pub fn mend(&self) {
         self.is_cut.set(false);
+        self.is_deaf.set(false);
     }
 
     pub fn rename(&self, id: MavId) {
@@ -37,7 +44,7 @@ impl Cable {
 /// For the gimbal at its end.
 impl Interceptor for Cable {
     fn towards_peer(&mut self, bytes: &[u8]) -> Passage {
-        if self.is_cut.get() {
+        if self.is_cut.get() || self.is_deaf.get() {
             return Passage::Lost;
         }
         match self.alias.get() {

@@ -1,16 +1,22 @@
 //! The daemon is killed while it turns, and what it left behind is read by the next.
 
 use gimbald::bridge::settings::SystemId;
+use gimbald::gimbals::gremsy::config::GremsySettings;
+use gimbald::gimbals::gremsy::driver::Generation;
+use gimbald::gimbals::operation::Operation;
 use gimbald::gimbals::settings::{Family, GimbalSettings};
+use gimbald::manager::asked::Asked;
+use gimbald::wire::dialect::COMMAND_LONG_DATA;
 
 use super::*;
-use crate::support::script::px4_heartbeat;
+use crate::support::script::{of, px4_heartbeat};
 
 /// `camera` has an entry that names no device; the other one, on a channel of its own on the same link, has none.
 struct Two {
     flight: Flight,
     other: Gimbal,
     other_cable: Cable,
+    other_place: Place,
     settings: Settings,
 }
 
@@ -22,7 +28,7 @@ impl Two {
         let place = flight.world.open(1);
         let (other, other_cable) = Gimbal::install(&mut flight.world, place, kind, 171);
         flight.run_for(22 * SECOND);
-        Self { flight, other, other_cable, settings }
+        Self { flight, other, other_cable, other_place: place, settings }
     }
 
     fn turn(&mut self, manager: u8) {
@@ -118,7 +124,13 @@ fn who_is_waited_for_is_kept_for_the_next_start_too() {
             two.flight.run_for(20 * SECOND);
             two.flight.assert_rests(&what);
             let family = if kind == Kind::V2Device { "" } else { "\tgremsy" };
-            assert_eq!(two.flight.world.stored_turning, [format!("gimbal-171\t1/171{family}")], "{what}");
+            let waited_for = format!("gimbal-171\t1/171{family}");
+            assert_eq!(two.flight.world.stored_turning, std::slice::from_ref(&waited_for), "{what}");
+            // One that turns now comes last, where a start that finds too many lines looks first.
+            two.turn(191);
+            two.flight.run_for(SECOND);
+            let turning = format!("camera\t1/154{family}");
+            assert_eq!(two.flight.world.stored_turning, [waited_for, turning], "{what}");
 
             if by_signal {
                 two.flight.world.input(gimbald::bridge::Input::Shutdown);
@@ -151,6 +163,65 @@ fn a_family_that_was_configured_is_kept_for_the_next_start() {
         flight.assert_rests(&format!("{kind:?}"));
         flight.run_for(20 * SECOND);
         assert_eq!(flight.world.stored_turning, Vec::<String>::new(), "{kind:?}");
+    }
+}
+
+/// "A v1 Gremsy has to acknowledge a stop … A Gremsy that speaks v2 … is told on while it tells that it turns": also one whose
+/// generation is configured, so that it can be spoken to at once. Until then it is kept for the start after this one.
+#[test]
+fn one_of_a_known_generation_has_to_show_that_it_has_stopped() {
+    for (kind, generation) in [(Kind::GremsyV1, Generation::V1), (Kind::GremsyV2, Generation::V2)] {
+        let camera = GimbalSettings { family: Family::Gremsy, ..GimbalSettings::found("camera".to_owned()) };
+        let gremsy = GremsySettings { generation: Some(generation), ..camera.gremsy };
+        let settings = Settings { gimbals: vec![GimbalSettings { gremsy, ..camera }], ..three_links() };
+        let mut flight = Flight::turning_with(kind, settings.clone());
+        let kept = ["camera\t1/154\tgremsy"];
+        assert_eq!(flight.world.stored_turning, kept, "{kind:?}");
+        flight.cable.cut_towards_gimbal();
+        for _ in 0..2 {
+            flight.world.kill();
+            let left_turning = flight.world.stored_turning.clone();
+            flight.world.start(Settings { left_turning, ..settings.clone() });
+            flight.run_for(30 * SECOND);
+            assert_eq!(flight.world.stored_turning, kept, "{kind:?}: it turns, as it says");
+        }
+        flight.cable.mend();
+        // It may swing back to where it looked when it was to stop.
+        flight.run_for(15 * SECOND);
+        flight.assert_rests(&format!("{kind:?}"));
+        assert_eq!(flight.world.stored_turning, Vec::<String>::new(), "{kind:?}");
+    }
+}
+
+/// "Whoever has that name is stopped after five seconds, unless somebody steers it": the pilot does, to whose radio control it
+/// was left. One that speaks v2 does not tell so itself.
+#[test]
+fn one_in_the_hands_of_its_radio_control_is_not_stopped_for_another() {
+    for kind in [Kind::GremsyV1, Kind::GremsyV2] {
+        let mut two = Two::begin(kind);
+        two.turn(191);
+        two.flight.run_for(2 * SECOND);
+        two.flight.cable.cut();
+        two.kill_and_start();
+        let started = two.flight.world.now;
+        let asked = Asked::Operation(Operation::RadioControl);
+        let mut handed_over = None;
+        while handed_over.is_none() && two.flight.world.now.since(started) < 5 * SECOND {
+            two.flight.run_for(SECOND / 10);
+            let id = two.flight.world.ask_by_name("camera", &asked);
+            two.flight.run_for(SECOND / 10);
+            handed_over = two.flight.world.answers.contains(&(id, Ok(()))).then_some(two.flight.world.now);
+        }
+        assert!(handed_over.is_some(), "{kind:?}: {:?}", two.flight.world.answers);
+        two.flight.world.forget();
+        two.flight.run_for(15 * SECOND);
+        let gimbals = two.flight.world.snapshot().gimbals;
+        let camera = gimbals.iter().find(|gimbal| gimbal.name == "camera").expect("it is there");
+        assert_eq!((camera.device.as_deref(), &camera.setpoint), (Some("1/171"), &None), "{kind:?}");
+        let heard = two.flight.world.take(two.other_place);
+        let commands: Vec<COMMAND_LONG_DATA> = of(&heard);
+        assert!(commands.iter().all(|told| ![204, 205].contains(&told.command)), "{kind:?}: {commands:?}");
+        assert!(heard.iter().all(|arrival| arrival.id() != 284), "{kind:?}");
     }
 }
 

@@ -1,7 +1,7 @@
 //! Its MAVLink id becomes another while it turns.
 
 use gimbald::gimbals::mavlink_v1::sim as mavlink_v1;
-use gimbald::gimbals::settings::GimbalSettings;
+use gimbald::gimbals::settings::{Family, GimbalSettings};
 use gimbald::wire::dialect::COMMAND_LONG_DATA;
 
 use super::*;
@@ -74,4 +74,57 @@ fn a_v1_gimbal_that_comes_after_a_gremsy_is_not_moved() {
         gimbals.iter().find(|gimbal| gimbal.name == "gimbal-171").map(|gimbal| gimbal.family.as_str()),
         Some("mavlink_v1")
     );
+}
+
+/// A plain v1 gimbal has no rotation of its own that could have been left: it is not the v2 device that fell silent while it
+/// turned, whether that is known at once or found out; one that tells nothing of where it looks would be taken to its middle.
+#[test]
+fn a_v1_gimbal_that_comes_after_a_v2_device_is_told_nothing() {
+    let entry = GimbalSettings {
+        component_id: Some(171),
+        family: Family::MavlinkV1,
+        ..GimbalSettings::found("gimbal-171".to_owned())
+    };
+    for gimbals in [vec![], vec![entry]] {
+        let mut flight = Flight::turning_with(Kind::V2Device, Settings { gimbals, ..three_links() });
+        flight.cable.cut();
+        // It is there, and steerable, when the other one is given up.
+        flight.run_for(2 * SECOND);
+        let place = flight.world.open(1);
+        let settings = mavlink_v1::DeviceSettings { component_id: 171, ..mavlink_v1::DeviceSettings::default() };
+        let device = mavlink_v1::Device::new(flight.world.now, settings);
+        flight.world.install(place, device);
+        flight.world.forget();
+        flight.run_for(40 * SECOND);
+        let told: Vec<COMMAND_LONG_DATA> = flight.world.take_messages(place);
+        assert!(told.iter().all(|told| ![204, 205].contains(&told.command)), "{told:?}");
+        let gimbals = flight.world.snapshot().gimbals;
+        let other = gimbals.iter().find(|gimbal| gimbal.name == "gimbal-171").expect("it is there");
+        assert_eq!((other.family.as_str(), other.state.as_str(), &other.setpoint), ("mavlink_v1", "alive", &None));
+    }
+}
+
+/// "A stop counts when the gimbal has stopped": what is known of its rotation is not forgotten when it takes the system id of the
+/// vehicle, which is no other gimbal.
+#[test]
+fn one_that_takes_the_id_of_the_vehicle_is_told_to_stop_on() {
+    for kind in [Kind::GremsyV1, Kind::GremsyV2] {
+        let mut flight = Flight::begin(kind);
+        flight.cable.rename(MavId::new(7, 154));
+        flight.run_for(25 * SECOND);
+        assert_eq!(flight.world.snapshot().gimbals[0].device.as_deref(), Some("7/154"), "{kind:?}");
+        flight.turn_for(3 * SECOND);
+        flight.cable.cut_towards_gimbal();
+        flight.run_for(6 * SECOND);
+        let before = flight.gimbal.yaw_deg();
+        flight.cable.rename(GIMBAL);
+        flight.run_for(9 * SECOND);
+        assert!((flight.gimbal.yaw_deg() - before).abs() > 10.0, "{kind:?} turns");
+        assert_eq!(flight.world.snapshot().gimbals[0].device.as_deref(), Some("1/154"), "{kind:?}");
+        assert_eq!(flight.world.stored_turning.len(), 1, "{kind:?}: {:?}", flight.world.stored_turning);
+        flight.cable.mend();
+        flight.run_for(25 * SECOND);
+        flight.assert_rests(&format!("{kind:?}"));
+        assert_eq!(flight.world.stored_turning, Vec::<String>::new(), "{kind:?}");
+    }
 }

@@ -168,6 +168,10 @@ impl Stopping {
             return false;
         }
         self.looked = Some((now, look));
+        if self.turned.over_ground.is_none() && before.heading.is_some() {
+            // It is judged by both frames, and one of them was not known at first.
+            self.turned = Turned::new(at);
+        }
         let turned = |frame| Some((look.yaw_in(frame)? - before.yaw_in(frame)?).wrapped().degrees());
         let (from_nose, over_ground) = (turned(YawFrame::Vehicle), turned(YawFrame::Earth));
         let pitched = (look.pitch - before.pitch).degrees();

@@ -1,6 +1,6 @@
 //! Gimbals with radio control inputs of their own.
 
-use gimbald::wire::dialect::{GIMBAL_MANAGER_STATUS_DATA, MavMessage};
+use gimbald::wire::dialect::{GIMBAL_DEVICE_SET_ATTITUDE_DATA, GIMBAL_MANAGER_STATUS_DATA, MavMessage};
 use gimbald::wire::ids::CapFlags;
 
 use super::{COMPANION, FIELD, SECOND, assert_near, fly, only_setpoint, setpoints, with_gimbal, with_gimbal_that};
@@ -99,6 +99,31 @@ fn a_54_radio_control_that_has_the_gimbal_is_left_alone() {
     world.forget();
     run_with(&mut world, places, SECOND, EXCLUSIVE);
     assert_eq!(setpoints(&mut world, places), []);
+}
+
+/// "A gimbal that keeps turning after its operator is gone": a device goes on with the rate that it was told last when its
+/// radio control lets go of it, however long that had it. It is told to stop then, and as long as it takes; nothing before.
+#[test]
+fn a_rotation_that_radio_control_took_over_is_stopped_when_it_lets_go() {
+    let (mut world, places) = with_inputs();
+    report(&mut world, places, 0, 10.0);
+    world.send(places.ground, GCS, &set_pitchyaw(NAN, NAN, 0.0, 0.2, 44));
+    run_with(&mut world, places, SECOND, 0);
+    assert!(setpoints(&mut world, places).iter().all(|(_, setpoint)| setpoint.angular_velocity_z == 0.2));
+
+    run_with(&mut world, places, 5 * SECOND, EXCLUSIVE);
+    assert_eq!(setpoints(&mut world, places), []);
+
+    run_with(&mut world, places, 2 * SECOND, 0);
+    let told = setpoints(&mut world, places);
+    assert!(told.len() >= 20, "{told:?}");
+    let rates = |setpoint: &GIMBAL_DEVICE_SET_ATTITUDE_DATA| {
+        [setpoint.angular_velocity_x, setpoint.angular_velocity_y, setpoint.angular_velocity_z]
+    };
+    let (stops, held): (Vec<_>, Vec<_>) = told.iter().partition(|(_, setpoint)| setpoint.q[0].is_nan());
+    assert!(!stops.is_empty() && stops.iter().all(|(_, setpoint)| rates(setpoint)[1..] == [0.0, 0.0]), "{stops:?}");
+    assert!(stops.last().map(|told| told.0) < held.first().map(|told| told.0), "it is held where it came to rest");
+    assert!(!held.is_empty());
 }
 
 /// `RC_MIXED` goes with each setpoint; what the gimbal makes of it is its business.
