@@ -5,6 +5,8 @@
 //! manager are not seen anywhere else. A gimbal that is at the autopilot's end of the line is not presented: there the
 //! autopilot has it already.
 
+use std::time::Duration;
+
 use super::Bridge;
 use super::conflicts::{Conflict, Outcome};
 use super::heartbeat;
@@ -20,6 +22,9 @@ use crate::timestamp::Timestamp;
 use crate::wire::dialect::{GIMBAL_DEVICE_SET_ATTITUDE_DATA, MavMessage};
 use crate::wire::ids::{CommandResult, command, component, mav_state, mav_type, message};
 use crate::wire::{Frame, MavId, Target};
+
+/// Which gimbal is the first is not decided by which beats first: gimbals that are there beat once a second.
+const OTHERS_COME_WITHIN: Duration = Duration::from_secs(3);
 
 /// The gimbals that are presented.
 #[derive(Debug, Default)]
@@ -48,7 +53,8 @@ impl Presented {
 }
 
 impl Bridge {
-    /// Presents gimbals that are new: 191's from the start, and those of the configuration; others when they are found.
+    /// Presents gimbals that are new: those of the configuration from the start, or 191's where there are none; others when
+    /// they are found, and those that come before them by the ids of the managers had time to be.
     pub(super) fn present_new(&mut self, now: Timestamp) {
         if !self.presented.is_on {
             return;
@@ -57,10 +63,16 @@ impl Bridge {
         // 191 answers also where it has no gimbal; ArduPilot looks for one that is there under the first id.
         let are_some = self.roster.iter().any(is_there);
         let wanted = |gimbal: &&Gimbal| if are_some { is_there(gimbal) } else { gimbal.beats() };
-        let managers: Vec<u8> = self.roster.iter().filter(wanted).map(|gimbal| gimbal.component).collect();
-        for manager in &managers {
+        let mut managers: Vec<u8> = self.roster.iter().filter(wanted).map(|gimbal| gimbal.component).collect();
+        managers.sort_unstable();
+        let all_came =
+            self.roster.iter().any(|gimbal| gimbal.configured || gimbal.has_device_for(now, OTHERS_COME_WITHIN));
+        for (manager, in_row) in managers.iter().zip(component::ONBOARD_COMPUTER..) {
             if self.presented.devices.iter().any(|device| device.manager == *manager) {
                 continue;
+            }
+            if !all_came && *manager != in_row {
+                break;
             }
             let without_gimbal = self.presented.devices.iter_mut().find(|device| !managers.contains(&device.manager));
             if let Some(device) = without_gimbal {
@@ -79,6 +91,7 @@ impl Bridge {
 
     /// Once a second.
     pub(super) fn beat_as_presented(&mut self, now: Timestamp) {
+        self.present_new(now);
         self.beat_for_each_presented(now, false);
     }
 

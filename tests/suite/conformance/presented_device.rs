@@ -291,7 +291,8 @@ fn a_gimbal_alone_is_what_the_first_mount_looks_for() {
         world.send(places.gimbal, alone, &gimbal_heartbeat());
         let information = device_information(world.now, usual_capabilities());
         world.send(places.gimbal, alone, &MavMessage::GIMBAL_DEVICE_INFORMATION(information));
-        world.run_with(2 * SECOND, &beats);
+        // No more than three seconds are waited for one that comes before it.
+        world.run_with(4 * SECOND, &beats);
         let presented = world
             .snapshot()
             .gimbals
@@ -299,6 +300,46 @@ fn a_gimbal_alone_is_what_the_first_mount_looks_for() {
             .filter_map(|gimbal| Some((gimbal.manager_component_id, gimbal.presented?.device)));
         assert_eq!(presented.collect::<Vec<_>>(), [(192, "1/154".to_owned())]);
         assert_eq!(world.ask(places.autopilot, AUTOPILOT, &request_message(GIMBAL, 283)).len(), 2, "ACK and 283");
+    }
+}
+
+/// "The first gimbal, by the ids of the managers, is the device 154 there", whichever beats first; and no longer than a moment is
+/// waited for the one that comes before another, which may not be there.
+#[test]
+fn the_order_in_which_gimbals_beat_decides_nothing() {
+    let second = MavId::new(1, 171);
+    for (between, expected) in [
+        (SECOND / 10, [(191, "1/154"), (192, "1/171")]),
+        (2 * SECOND, [(191, "1/154"), (192, "1/171")]),
+        // Found later than others it takes the first that is free.
+        (5 * SECOND, [(191, "1/171"), (192, "1/154")]),
+    ] {
+        let (mut world, places) = World::empty(presenting());
+        let beats = [(SECOND, places.autopilot, AUTOPILOT, ardupilot_heartbeat())];
+        world.run_with(5 * SECOND, &beats);
+        let tell = |world: &mut World, device| {
+            world.send(places.gimbal, device, &gimbal_heartbeat());
+            let information = device_information(world.now, usual_capabilities());
+            world.send(places.gimbal, device, &MavMessage::GIMBAL_DEVICE_INFORMATION(information));
+        };
+        tell(&mut world, second);
+        for _ in 0..between.as_millis() / 100 {
+            world.run_with(SECOND / 10, &beats);
+            tell(&mut world, second);
+        }
+        for _ in 0..50 {
+            tell(&mut world, GIMBAL);
+            tell(&mut world, second);
+            world.run_with(SECOND / 10, &beats);
+        }
+        let gimbals = world.snapshot().gimbals;
+        let mut presented: Vec<_> = gimbals
+            .into_iter()
+            .filter_map(|gimbal| Some((gimbal.manager_component_id, gimbal.presented?.device)))
+            .collect();
+        presented.sort();
+        let expected = expected.map(|(manager, device)| (manager, device.to_owned()));
+        assert_eq!(presented, expected, "{between:?}");
     }
 }
 
