@@ -1,6 +1,7 @@
 //! "A gimbal that turns after its operator is gone is our worst bug": whatever becomes of its cable, its id and the daemon
 //! while it turns, it stands soon after it can be reached.
 
+mod about;
 mod away;
 mod killed;
 mod renamed;
@@ -17,11 +18,12 @@ use gimbald::sim::plant::PlantSettings;
 use gimbald::sim::vehicle::{Vehicle, VehicleSettings};
 use gimbald::timestamp::Timestamp;
 use gimbald::wire::MavId;
+use gimbald::wire::dialect::MavMessage;
 
 use crate::support::cable::Cable;
 use crate::support::hub::Watched;
 use crate::support::interception::Intercepted;
-use crate::support::script::{ACCEPTED, NAN, command_long, ground_heartbeat, set_pitchyaw};
+use crate::support::script::{ACCEPTED, NAN, command_long, ground_heartbeat, set_attitude, set_pitchyaw};
 use crate::support::world::{GCS, GIMBAL, MANAGER, Place, Places, World, three_links};
 
 const SECOND: Duration = Duration::from_secs(1);
@@ -38,6 +40,42 @@ enum Kind {
 
 const KINDS: [Kind; 3] = [Kind::V2Device, Kind::GremsyV1, Kind::GremsyV2];
 
+/// What it turns about, slowly enough that its end stops are far.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum About {
+    Roll,
+    Pitch,
+    Yaw,
+}
+
+impl About {
+    /// Of roll, pitch and yaw in a pose.
+    const fn index(self) -> usize {
+        match self {
+            Self::Roll => 0,
+            Self::Pitch => 1,
+            Self::Yaw => 2,
+        }
+    }
+
+    const fn rate_dps(self) -> f32 {
+        match self {
+            Self::Roll => 1.5,
+            Self::Pitch => -2.0,
+            Self::Yaw => 5.0,
+        }
+    }
+
+    fn demand(self) -> MavMessage {
+        let rate = self.rate_dps().to_radians();
+        match self {
+            Self::Roll => set_attitude([NAN; 4], [rate, 0.0, 0.0], 44),
+            Self::Pitch => set_pitchyaw(NAN, NAN, rate, 0.0, 44),
+            Self::Yaw => set_pitchyaw(NAN, NAN, 0.0, rate, 44),
+        }
+    }
+}
+
 /// A gimbal that can be looked at.
 #[derive(Clone)]
 enum Gimbal {
@@ -46,11 +84,17 @@ enum Gimbal {
 }
 
 impl Gimbal {
+    /// Roll, pitch and yaw of its joints in degrees.
+    fn pose_deg(&self) -> [f64; 3] {
+        let pose = match self {
+            Self::V2Device(device) => device.look().plant().pose(),
+            Self::Gremsy(device) => device.look().plant().pose(),
+        };
+        [pose.roll, pose.pitch, pose.yaw].map(Angle::degrees)
+    }
+
     fn yaw_deg(&self) -> f64 {
-        match self {
-            Self::V2Device(device) => device.look().plant().pose().yaw.degrees(),
-            Self::Gremsy(device) => device.look().plant().pose().yaw.degrees(),
-        }
+        self.pose_deg()[About::Yaw.index()]
     }
 
     /// A gimbal at the end of a cable there.
@@ -90,6 +134,7 @@ struct Flight {
     places: Places,
     gimbal: Gimbal,
     cable: Cable,
+    about: About,
 }
 
 impl Flight {
@@ -102,7 +147,7 @@ impl Flight {
         let (mut world, places) = World::empty(settings);
         world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
         let (gimbal, cable) = Gimbal::install(&mut world, places.gimbal, kind, GIMBAL.component);
-        let mut flight = Self { world, places, gimbal, cable };
+        let mut flight = Self { world, places, gimbal, cable, about: About::Yaw };
         flight.run_for(22 * SECOND);
         flight.world.forget();
         flight
@@ -115,9 +160,8 @@ impl Flight {
 
     /// And that asks for a rotation again and again.
     fn turn_for(&mut self, duration: Duration) {
-        let rate = set_pitchyaw(NAN, NAN, 0.0, 5_f32.to_radians(), 44);
         let beat = (SECOND, self.places.ground, GCS, ground_heartbeat());
-        self.world.run_with(duration, &[beat, (SECOND / 10, self.places.ground, GCS, rate)]);
+        self.world.run_with(duration, &[beat, (SECOND / 10, self.places.ground, GCS, self.about.demand())]);
     }
 
     /// It turns, and the ground station asks for that still.
@@ -127,12 +171,20 @@ impl Flight {
 
     fn turning_with(kind: Kind, settings: Settings) -> Self {
         let mut flight = Self::begin_with(kind, settings);
-        flight.turn_for(2 * SECOND);
-        let before = flight.gimbal.yaw_deg();
-        flight.turn_for(SECOND);
-        assert!(flight.gimbal.yaw_deg() > before + 2.0, "{kind:?} turns");
-        assert_eq!(flight.world.stored_turning.len(), 1, "{kind:?}");
+        flight.turn(About::Yaw, &format!("{kind:?}"));
         flight
+    }
+
+    /// It turns for three seconds, and goes on.
+    fn turn(&mut self, about: About, what: &str) {
+        self.about = about;
+        self.turn_for(2 * SECOND);
+        let before = self.gimbal.pose_deg();
+        self.turn_for(SECOND);
+        let turned = self.gimbal.pose_deg()[about.index()] - before[about.index()];
+        let expected = f64::from(about.rate_dps());
+        assert!((0.4..2.6).contains(&(turned / expected)), "{what}: by {turned} in a second about {about:?}");
+        assert_eq!(self.world.stored_turning.len(), 1, "{what}");
     }
 
     fn rate_command(&mut self, yaw_rate: f32) -> Option<u8> {
@@ -140,15 +192,17 @@ impl Flight {
         self.world.result_of(self.places.ground, GCS, &command)
     }
 
-    /// It does not turn for five seconds.
+    /// It turns about nothing for five seconds.
     fn assert_rests(&mut self, what: &str) {
-        assert_rests(self, |flight| flight.gimbal.yaw_deg(), what);
+        let gimbal = self.gimbal.clone();
+        assert_rests(self, &gimbal, what);
     }
 }
 
-fn assert_rests(flight: &mut Flight, yaw_deg: impl Fn(&Flight) -> f64, what: &str) {
-    let before = yaw_deg(flight);
+fn assert_rests(flight: &mut Flight, gimbal: &Gimbal, what: &str) {
+    let before = gimbal.pose_deg();
     flight.run_for(5 * SECOND);
-    let after = yaw_deg(flight);
-    assert!((after - before).abs() < 0.5, "{what}: it turns on, {before} {after}");
+    let after = gimbal.pose_deg();
+    let rests = before.iter().zip(after).all(|(before, after)| (after - before).abs() < 0.5);
+    assert!(rests, "{what}: it turns on, {before:?} {after:?}");
 }

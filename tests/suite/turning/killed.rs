@@ -140,7 +140,7 @@ fn who_is_waited_for_is_kept_for_the_next_start_too() {
             two.other_cable.mend();
             two.flight.run_for(8 * SECOND);
             let other = two.other.clone();
-            super::assert_rests(&mut two.flight, |_| other.yaw_deg(), &what);
+            super::assert_rests(&mut two.flight, &other, &what);
             two.flight.run_for(10 * SECOND);
             assert_eq!(two.flight.world.stored_turning, Vec::<String>::new(), "{what}");
         }

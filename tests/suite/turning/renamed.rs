@@ -1,5 +1,6 @@
 //! Its MAVLink id becomes another while it turns.
 
+use gimbald::geometry::GimbalAngles;
 use gimbald::gimbals::mavlink_v1::sim as mavlink_v1;
 use gimbald::gimbals::settings::{Family, GimbalSettings};
 use gimbald::wire::dialect::COMMAND_LONG_DATA;
@@ -61,14 +62,22 @@ fn a_v1_gimbal_that_comes_after_a_gremsy_is_not_moved() {
     flight.cable.cut();
     flight.run_for(2 * SECOND);
     let place = flight.world.open(1);
-    let settings = mavlink_v1::DeviceSettings { component_id: 171, ..mavlink_v1::DeviceSettings::default() };
-    let device = mavlink_v1::Device::new(flight.world.now, settings);
-    flight.world.install(place, device);
+    let pose = GimbalAngles { roll: Angle::ZERO, pitch: Angle::from_degrees(-12.0), yaw: Angle::from_degrees(33.0) };
+    let plant = PlantSettings { noise: Angle::ZERO, initial: pose, ..PlantSettings::default() };
+    let settings = mavlink_v1::DeviceSettings { component_id: 171, plant, ..mavlink_v1::DeviceSettings::default() };
+    let device = Watched::new(mavlink_v1::Device::new(flight.world.now, settings));
+    flight.world.install(place, device.clone());
     flight.world.forget();
     flight.run_for(20 * SECOND);
-    let told: Vec<u16> =
-        flight.world.take_messages::<COMMAND_LONG_DATA>(place).iter().map(|told| told.command).collect();
-    assert!(!told.is_empty() && !told.contains(&205), "{told:?}");
+    let looks = device.look().plant().pose();
+    assert_eq!([looks.roll, looks.pitch, looks.yaw], [pose.roll, pose.pitch, pose.yaw]);
+    let arrivals = flight.world.take(place);
+    let ours: Vec<_> = arrivals.iter().filter(|arrival| (191..=194).contains(&arrival.source().component)).collect();
+    let commands = ours.iter().filter_map(|arrival| arrival.frame().decode::<COMMAND_LONG_DATA>());
+    let told: Vec<u16> = commands.map(|told| told.command).collect();
+    assert!(!told.is_empty() && told.iter().all(|command| matches!(command, 511 | 512)), "{told:?}");
+    let steers = |id: u32| matches!(id, 157 | 284);
+    assert!(!ours.iter().any(|arrival| steers(arrival.id())), "no setpoint either");
     let gimbals = flight.world.snapshot().gimbals;
     assert_eq!(
         gimbals.iter().find(|gimbal| gimbal.name == "gimbal-171").map(|gimbal| gimbal.family.as_str()),

@@ -90,9 +90,11 @@ proptest! {
     #[test]
     fn a_gimbal_that_can_be_reached_is_at_rest_soon(
         kind in prop_oneof![Just(Kind::V2Device), Just(Kind::GremsyV1), Just(Kind::GremsyV2)],
+        about in prop_oneof![Just(About::Roll), Just(About::Pitch), Just(About::Yaw)],
         steps in proptest::collection::vec(step(), 1..14),
     ) {
-        let mut flight = Flight::turning(kind);
+        let mut flight = Flight::begin(kind);
+        flight.turn(about, &format!("{kind:?}"));
         let mut is_plugged_in = true;
         for step in &steps {
             flight.take(*step, &mut is_plugged_in);
@@ -100,7 +102,7 @@ proptest! {
         flight.cable.mend();
         flight.take(Step::PlugIn, &mut is_plugged_in);
         flight.run_for(20 * SECOND);
-        flight.assert_rests(&format!("{kind:?} {steps:?}"));
+        flight.assert_rests(&format!("{kind:?} about {about:?} {steps:?}"));
         prop_assert_eq!(&flight.world.stored_turning, &Vec::<String>::new());
     }
 }

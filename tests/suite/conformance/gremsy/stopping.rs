@@ -95,11 +95,44 @@ fn turning_by_name(generation: Generation) -> (World, Places, Deaf) {
     (world, places, deaf)
 }
 
+/// The same about any axis, at so many degrees per second of roll, pitch and yaw, begun far from the end stop.
+fn turning_about(generation: Generation, rates_dps: [f64; 3]) -> (World, Places, Deaf) {
+    let (mut world, places, deaf) = turning_by_name(generation);
+    let axis = |degrees: f64| AxisDemand { angle: Some(Angle::from_degrees(degrees)), rate: None };
+    let away = |rate: f64, stop: f64| axis(if rate == 0.0 { 0.0 } else { -stop * rate.signum() });
+    let [roll, pitch, _] = rates_dps;
+    let (far_roll, far_pitch) = (away(roll, 35.0), away(pitch, 40.0));
+    let point = Asked::Point { roll: far_roll, pitch: far_pitch, yaw: axis(0.0), yaw_frame: YawFrame::Vehicle };
+    let [roll, pitch, yaw] = rates_dps.map(AngularRate::from_degrees_per_second);
+    let turn = Asked::Turn { roll: Some(roll), pitch, yaw, yaw_frame: YawFrame::Vehicle };
+    for (asked, wait) in [(point, 4 * SECOND), (turn, SECOND)] {
+        let id = world.ask_by_name("camera", &asked);
+        assert_eq!(world.answers.last(), Some(&(id, Ok(()))), "{asked:?}");
+        run(&mut world, places, wait);
+    }
+    world.forget();
+    (world, places, deaf)
+}
+
+/// Roll, pitch and yaw from the nose as the status shows them, degrees.
+fn pose(world: &World) -> [f64; 3] {
+    let (pitch, yaw) = looks(world);
+    [seen(world).attitude.roll_deg.expect("a roll"), pitch, yaw]
+}
+
+/// By how far it looks elsewhere than before, about each axis: the shorter way round.
+fn turned_since(before: [f64; 3], world: &World) -> [f64; 3] {
+    let now = pose(world);
+    [0, 1, 2].map(|axis| Angle::from_degrees(now[axis] - before[axis]).wrapped().degrees())
+}
+
+/// It turns about nothing.
+#[track_caller]
 fn assert_rests(world: &mut World, places: Places) {
-    let before = looks(world);
+    let before = pose(world);
     run(world, places, 3 * SECOND);
-    let after = looks(world);
-    assert!((after.1 - before.1).abs() < 0.5, "it turns on: {before:?} {after:?}");
+    let turned = turned_since(before, world);
+    assert!(turned.iter().all(|turned| turned.abs() < 0.5), "it turns on: {turned:?} since {before:?}");
 }
 
 /// The replacement of a rotation takes a mode that the gimbal does not change to: it stands all the same.
@@ -124,39 +157,61 @@ fn what_is_asked_by_name_waits_until_it_has_stopped() {
             deaf.setpoints.set(10);
             assert_eq!(operate(&mut world, places, operation.clone()), Some(Ok(())), "{generation:?} {operation:?}");
             assert_rests(&mut world, places);
-            // What is heard while nothing arrives does not mean that it has stopped: it tells that it turns.
-            let (mut world, places, deaf) = turning_by_name(Generation::V2);
+        }
+    }
+}
+
+/// What is heard while nothing arrives does not mean that it has stopped: it tells that it turns, about whatever that is.
+#[test]
+fn one_that_tells_that_it_turns_has_not_stopped() {
+    for operation in [Operation::SetYawMode(YawMode::Follow), Operation::RadioControl] {
+        for rates in [[0.0, 0.0, 5.0], [0.0, -3.0, 0.0], [3.0, 0.0, 0.0]] {
+            let (mut world, places, deaf) = turning_about(Generation::V2, rates);
             deaf.setpoints.set(40);
             let not_done = operate(&mut world, places, operation.clone());
-            assert_eq!(not_done, Some(Err(NotDone::Operation(OperationError::StillTurning))), "{operation:?}");
-            run(&mut world, places, 4 * SECOND);
-            assert_rests(&mut world, places);
-            // One that hears none of them is not left alone.
-            let (mut world, places, deaf) = turning_by_name(Generation::V1);
-            deaf.setpoints.set(u32::MAX);
-            let no_answer = Some(Err(NotDone::Operation(OperationError::NoAnswer)));
-            assert_eq!(operate(&mut world, places, operation), no_answer);
-            deaf.setpoints.set(0);
-            // It goes back to where it was when it was to stop.
+            assert_eq!(not_done, Some(Err(NotDone::Operation(OperationError::StillTurning))), "{operation:?} {rates:?}");
             run(&mut world, places, 4 * SECOND);
             assert_rests(&mut world, places);
         }
     }
 }
 
+/// One that hears none of them is not left alone.
+#[test]
+fn one_that_hears_no_stop_is_not_left_alone() {
+    for operation in [Operation::SetYawMode(YawMode::Follow), Operation::RadioControl] {
+        let (mut world, places, deaf) = turning_by_name(Generation::V1);
+        deaf.setpoints.set(u32::MAX);
+        let no_answer = Some(Err(NotDone::Operation(OperationError::NoAnswer)));
+        assert_eq!(operate(&mut world, places, operation), no_answer);
+        deaf.setpoints.set(0);
+        // It goes back to where it was when it was to stop.
+        run(&mut world, places, 4 * SECOND);
+        assert_rests(&mut world, places);
+    }
+}
+
 /// A line that is out towards the gimbal for longer than a stop is waited for, and something asked meanwhile that would take
 /// the place of the zeros: it is not done, and the gimbal stands as soon as it hears again.
 #[test]
+#[rustfmt::skip]
 fn one_that_hears_nothing_for_long_stands_when_it_hears_again() {
-    for operation in [Operation::SetYawMode(YawMode::Follow), Operation::RadioControl, Operation::Mapping] {
-        let (mut world, places, deaf) = turning_by_name(Generation::V2);
+    for (operation,                              rates) in [
+        (Operation::SetYawMode(YawMode::Follow), [0.0, 0.0, 5.0]),
+        (Operation::SetYawMode(YawMode::Follow), [0.0, -2.5, 0.0]),
+        (Operation::RadioControl,                [0.0, 0.0, 5.0]),
+        (Operation::RadioControl,                [1.5, 0.0, 0.0]),
+        (Operation::Mapping,                     [0.0, 0.0, 5.0]),
+    ] {
+        let (mut world, places, deaf) = turning_about(Generation::V2, rates);
         deaf.setpoints.set(u32::MAX);
         run(&mut world, places, 20 * SECOND);
         let not_done = operate(&mut world, places, operation.clone());
-        assert_eq!(not_done, Some(Err(NotDone::Operation(OperationError::StillTurning))), "{operation:?}");
-        let before = looks(&world).1;
+        assert_eq!(not_done, Some(Err(NotDone::Operation(OperationError::StillTurning))), "{operation:?} {rates:?}");
+        let before = pose(&world);
         run(&mut world, places, SECOND);
-        assert!((looks(&world).1 - before).rem_euclid(360.0) > 4.0, "it turns: {before} {:?}", looks(&world));
+        let turned = turned_since(before, &world);
+        assert!(turned.iter().zip(rates).all(|(turned, rate)| (turned - rate).abs() < 0.5), "it turns on: {turned:?} {rates:?}");
         deaf.setpoints.set(0);
         run(&mut world, places, 6 * SECOND);
         assert_rests(&mut world, places);
@@ -205,7 +260,7 @@ fn one_that_goes_on_as_it_was_told_before_is_stopped_too() {
     for (pitch, yaw) in [(0.0, -20.0), (3.0, 0.0)] {
         let rate = AngularRate::from_degrees_per_second;
         let asked = Asked::Turn { roll: None, pitch: rate(pitch), yaw: rate(yaw), yaw_frame: YawFrame::Vehicle };
-        world.input(Input::Asked { id: OperationId(8), gimbal: "camera", asked: &asked });
+        world.ask_by_name("camera", &asked);
         run(&mut world, places, SECOND / 4);
     }
     let not_done = operate(&mut world, places, Operation::SetYawMode(YawMode::Follow));
@@ -234,8 +289,7 @@ fn a_copy_of_an_answer_does_not_stop_it() {
             target_system: 1,
             target_component: 191,
         };
-        let id = OperationId(7);
-        world.input(Input::Asked { id, gimbal: "camera", asked: &Asked::Operation(operation.clone()) });
+        world.ask_by_name("camera", &Asked::Operation(operation.clone()));
         for _ in 0..20 {
             world.send(places.gimbal, GIMBAL, &MavMessage::COMMAND_ACK(ack.clone()));
         }
@@ -248,25 +302,22 @@ fn a_copy_of_an_answer_does_not_stop_it() {
     }
 }
 
-/// A line that is out in both directions looks like a restart to who asked for one: the gimbal is stopped when it is back,
-/// unless it tells that it starts.
+/// A line that is out in both directions looks like a restart to who asked for one: the gimbal is stopped when it is back.
 #[test]
 fn one_that_only_seems_to_have_started_again_is_stopped() {
     for generation in [Generation::V1, Generation::V2] {
         for restart in [Restart::Reboot, Restart::Shutdown] {
             let (mut world, places, deaf) = turning_by_name(generation);
-            let before = looks(&world).1;
+            let before = pose(&world);
             deaf.everything.set(true);
             let done = operate(&mut world, places, Operation::Restart(restart));
             assert_eq!(done, Some(Ok(())), "{generation:?} {restart:?}");
             assert_eq!(world.stored_turning, ["camera\t1/154\tgremsy"], "{generation:?} {restart:?}");
             deaf.everything.set(false);
             run(&mut world, places, 4 * SECOND);
-            assert!(
-                (looks(&world).1 - before).rem_euclid(360.0) > 20.0,
-                "it has turned on: {before} {:?}",
-                looks(&world)
-            );
+            // For eight seconds at 5 degrees per second, and as fast as the vehicle besides where it turns about North.
+            let turned = turned_since(before, &world)[2];
+            assert!(turned > 35.0, "it has turned on: by {turned} since {before:?}");
             assert_rests(&mut world, places);
             assert_eq!(world.stored_turning, [""; 0], "{generation:?} {restart:?}");
         }
