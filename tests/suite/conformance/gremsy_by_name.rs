@@ -6,12 +6,14 @@ use std::time::Duration;
 use gimbald::actions::Action;
 use gimbald::bridge::settings::Settings;
 use gimbald::gimbals::gremsy::sim::{Device, DeviceSettings, Generation};
+use gimbald::gimbals::operation::OperationError;
 use gimbald::gimbals::settings::{Family, GimbalSettings};
 use gimbald::manager::asked::{Answer, NotDone};
 use gimbald::manager::request::Refusal;
 use gimbald::sim::vehicle::{Vehicle, VehicleSettings};
 use gimbald::timestamp::Timestamp;
-use gimbald::wire::ids::CommandResult;
+use gimbald::wire::dialect::COMMAND_LONG_DATA;
+use gimbald::wire::ids::{CommandResult, command, message};
 use serde_json::Value;
 
 use crate::support::world::{Places, World, three_links};
@@ -74,6 +76,17 @@ fn take(world: &mut World) {
 fn details(world: &World, pointer: &str) -> Value {
     let details = serde_json::to_value(&world.snapshot().gimbals[0].details).expect("plain data");
     details.pointer(pointer).cloned().unwrap_or(Value::Null)
+}
+
+/// What moved it or switched something since this was last asked: commands with their first parameter, and how many setpoints
+/// of v2.
+fn orders(world: &mut World, places: Places) -> (Vec<(u16, f32)>, usize) {
+    let arrivals = world.take(places.gimbal);
+    let commands = arrivals.iter().filter_map(|arrival| arrival.frame().decode::<COMMAND_LONG_DATA>());
+    let moves =
+        commands.filter(|told| !matches!(told.command, command::REQUEST_MESSAGE | command::SET_MESSAGE_INTERVAL));
+    let setpoints = arrivals.iter().filter(|arrival| arrival.id() == message::GIMBAL_DEVICE_SET_ATTITUDE).count();
+    (moves.map(|told| (told.command, told.param1)).collect(), setpoints)
 }
 
 /// Degrees; yaw from the nose.
@@ -146,18 +159,32 @@ fn a_gremsy_is_set() {
             ("motor-control",       None,            r#"{"tilt_stiffness": 30}"#,                  "/axes/tilt/stiffness",         30.0.into()),
             ("motor-control",       None,            r#"{"gyro_filter": 3}"#,                      "/gyro_filter",                 3.0.into()),
             ("limits",              Some("tilt"),    r#"{"min_deg": -80, "max_deg": 40}"#,         "/axes/tilt/min_deg",           (-80.0).into()),
+            ("limits",              Some("tilt"),    r#"{"min_deg": -80, "max_deg": 41}"#,         "/axes/tilt/max_deg",           41.0.into()),
             ("limits",              Some("pan"),     r#"{"min_deg": -100, "max_deg": 90}"#,        "/axes/pan/max_deg",            90.0.into()),
+            ("limits",              Some("pan"),     r#"{"min_deg": -101, "max_deg": 90}"#,        "/axes/pan/min_deg",            (-101.0).into()),
+            ("limits",              Some("roll"),    r#"{"min_deg": -15, "max_deg": 20}"#,         "/axes/roll/min_deg",           (-15.0).into()),
+            ("limits",              Some("roll"),    r#"{"min_deg": -15, "max_deg": 21}"#,         "/axes/roll/max_deg",           21.0.into()),
             ("encoder-unit",        None,            r#"{"unit": "angles"}"#,                      "/encoder_unit",                "angles".into()),
             ("combined-attitude",   None,            r#"{"enabled": false}"#,                      "/combined_attitude",           false.into()),
             ("combined-attitude",   None,            r#"{"enabled": true}"#,                       "/combined_attitude",           true.into()),
             ("home-on-mode-change", None,            r#"{"enabled": true}"#,                       "/home_on_mode_change",         true.into()),
             ("stream-rate",         None,            r#"{"stream": "raw_imu", "rate_hz": 20}"#,    "/streams/raw_imu/wanted_hz",   20.0.into()),
             ("stream-rate",         None,            r#"{"stream": "encoders", "rate_hz": "off"}"#, "/streams/encoders/wanted_hz", 0.0.into()),
+            ("stream-rate",         None,            r#"{"stream": "mount_orientation", "rate_hz": 25}"#, "/streams/mount_orientation/wanted_hz", 25.0.into()),
             ("refresh-parameters",  None,            "",                                           "/parameters/PWR_PAN",          55.0.into()),
             ("information",         None,            "",                                           "/radio_type",                  "sync".into()),
         ] {
             done(&mut world, command, in_path, body);
             assert_eq!(details(&world, pointer), expected, "{generation:?} {command} {body}");
+        }
+        // A v1 gimbal does not know the message.
+        let attitude = ask(&mut world, "stream-rate", None, r#"{"stream": "attitude_status", "rate_hz": 15}"#);
+        match generation {
+            Generation::V1 => assert_eq!(attitude, Err(NotDone::Operation(OperationError::UnsupportedByDevice))),
+            Generation::V2 => {
+                assert_eq!(attitude, Ok(()));
+                assert_eq!(details(&world, "/streams/attitude_status/wanted_hz"), 15.0);
+            }
         }
         let unknown = ask(&mut world, "set-parameter", Some("NO_SUCH"), r#"{"value": 1}"#);
         assert!(matches!(unknown, Err(NotDone::Operation(_))), "{unknown:?}");
@@ -181,8 +208,7 @@ fn a_gremsy_is_restarted_and_shut_down() {
         world.forget();
         world.run_for(5 * SECOND);
         assert_eq!(looks(&world), before, "{generation:?}: it stands");
-        let setpoints = world.take(places.gimbal).iter().filter(|arrival| arrival.id() == 284).count();
-        assert_eq!(setpoints, 0, "{generation:?}: it is told nothing");
+        assert_eq!(orders(&mut world, places), (vec![], 0), "{generation:?}: it is told nothing");
 
         take(&mut world);
         done(&mut world, "shutdown", None, r#"{"confirm": "shutdown"}"#);
@@ -207,12 +233,17 @@ fn a_gremsy_is_restarted_and_shut_down() {
 #[test]
 fn a_gremsy_is_left_to_its_radio_receiver() {
     for generation in [Generation::V1, Generation::V2] {
-        let (mut world, _) = with_gremsy(generation);
+        let (mut world, places) = with_gremsy(generation);
         done(&mut world, "point", None, r#"{"pitch_deg": -40}"#);
         world.run_for(3 * SECOND);
-        done(&mut world, "radio-control", None, "");
+        assert_eq!(looks(&world).0, -40.0, "{generation:?}");
         world.forget();
+        done(&mut world, "radio-control", None, "");
+        let handed_over = orders(&mut world, places);
+        assert_eq!(handed_over, (vec![(command::DO_MOUNT_CONFIGURE, 3.0)], 0), "{generation:?}");
         world.run_for(3 * SECOND);
+        assert_eq!(orders(&mut world, places), (vec![], 0), "{generation:?}: it is told nothing");
+        assert_eq!(world.snapshot().gimbals[0].setpoint, None, "{generation:?}");
         done(&mut world, "point", None, r#"{"pitch_deg": -20}"#);
         world.run_for(3 * SECOND);
         assert_eq!(looks(&world).0, -20.0, "{generation:?}");

@@ -1,6 +1,7 @@
 //! What is asked of it by its name: every function of the vendor's SDK, in both generations.
 
 use gimbald::geometry::AxisLimits;
+use gimbald::gimbals::details::AxisDetails;
 use gimbald::gimbals::gremsy::modes::{self, ControlMode};
 use gimbald::gimbals::gremsy::packet::{self, MessageRate};
 use gimbald::gimbals::operation::{
@@ -244,25 +245,30 @@ fn it_is_asked_once_more() {
 fn settings_are_written_and_read_back() {
     let degrees = Angle::from_degrees;
     let limits = |min, max| AxisLimits::new(degrees(min), degrees(max)).expect("in order");
-    let motion = AxisMotion {
-        control_speed_dps: Some(45.0),
-        control_smoothing: Some(70.0),
-        follow_speed: Some(50.0),
-        follow_smoothing: Some(30.0),
-        follow_window_deg: Some(8.0),
-        reversed: Some(true),
+    // Each axis has values of its own, so that none is taken for another's. Roll does not follow.
+    let motion = |more: f64, follows: bool, reversed| AxisMotion {
+        control_speed_dps: Some(45.0 + more),
+        control_smoothing: Some(70.0 + more),
+        follow_speed: follows.then_some(50.0 + more),
+        follow_smoothing: follows.then_some(30.0 + more),
+        follow_window_deg: follows.then_some(8.0 + more),
+        reversed: Some(reversed),
     };
     let motors = MotorControl {
         tilt: MotorAxis { stiffness: Some(25.0), hold_strength: Some(35.0) },
+        roll: MotorAxis { stiffness: Some(26.0), hold_strength: Some(36.0) },
+        pan: MotorAxis { stiffness: Some(27.0), hold_strength: Some(37.0) },
         gyro_filter: Some(3.0),
         output_filter: Some(2.0),
         ..MotorControl::default()
     };
     let settings = [
         Operation::SetLimits { axis: Axis::Tilt, limits: limits(-80.0, 30.0) },
-        Operation::SetLimits { axis: Axis::Roll, limits: limits(-20.0, 20.0) },
+        Operation::SetLimits { axis: Axis::Roll, limits: limits(-20.0, 25.0) },
         Operation::SetLimits { axis: Axis::Pan, limits: limits(-100.0, 120.0) },
-        Operation::SetAxisMotion { axis: Axis::Pan, motion },
+        Operation::SetAxisMotion { axis: Axis::Tilt, motion: motion(1.0, true, false) },
+        Operation::SetAxisMotion { axis: Axis::Roll, motion: motion(2.0, false, true) },
+        Operation::SetAxisMotion { axis: Axis::Pan, motion: motion(3.0, true, true) },
         Operation::SetMotorControl(motors),
         Operation::SetEncoderUnit(EncoderUnit::Angles),
         Operation::SetCombinedAttitude(true),
@@ -280,14 +286,29 @@ fn settings_are_written_and_read_back() {
         let (tilt, bits) = if is_old { (["TRAVEL_MIN_PIT", "TRAVEL_MAX_PIT"], "JOY_AXIS") } else { (["RC_LIM_MIN_TILT", "RC_LIM_MAX_TILT"], "RC_REVERSE_AXIS") };
         let expected = if is_old { [-80.0, 30.0] } else { [-30.0, 80.0] };
         assert_eq!(tilt.map(written), expected.map(Some), "{firmware}");
-        assert_eq!(written(bits), Some(f32::from(0x02_u8 | 0x08 | 0x10)), "{firmware}");
+        assert_eq!(written(bits), Some(f32::from(0x02_u8 | 0x04 | 0x08 | 0x10)), "{firmware}");
 
         let details = seen(&world).details;
-        let (tilt, pan) = (&details.axes["tilt"], &details.axes["pan"]);
-        assert_eq!((tilt.min_deg, tilt.max_deg, tilt.stiffness, tilt.hold_strength), (Some(-80.0), Some(30.0), Some(25.0), Some(35.0)));
-        assert_eq!((pan.min_deg, pan.max_deg, pan.reversed), (Some(-100.0), Some(120.0), Some(true)));
-        assert_eq!((pan.control_speed_dps, pan.control_smoothing, pan.follow_speed), (Some(45.0), Some(70.0), Some(50.0)));
-        assert_eq!((pan.follow_smoothing, pan.follow_window_deg), (Some(30.0), Some(8.0)));
+        for (axis,   min,    max,   more, follows, reversed, stiffness, hold) in [
+            ("tilt", -80.0,  30.0,  1.0,  true,    false,    25.0,      35.0),
+            ("roll", -20.0,  25.0,  2.0,  false,   true,     26.0,      36.0),
+            ("pan",  -100.0, 120.0, 3.0,  true,    true,     27.0,      37.0),
+        ] {
+            let motion = motion(more, follows, reversed);
+            let expected = AxisDetails {
+                min_deg: Some(min),
+                max_deg: Some(max),
+                control_speed_dps: motion.control_speed_dps,
+                control_smoothing: motion.control_smoothing,
+                follow_speed: motion.follow_speed,
+                follow_smoothing: motion.follow_smoothing,
+                follow_window_deg: motion.follow_window_deg,
+                reversed: motion.reversed,
+                stiffness: Some(stiffness),
+                hold_strength: Some(hold),
+            };
+            assert_eq!(details.axes[axis], expected, "{firmware} {axis}");
+        }
         assert_eq!((details.gyro_filter, details.output_filter), (Some(3.0), Some(2.0)));
         assert_eq!((details.combined_attitude, details.home_on_mode_change), (Some(true), Some(true)));
         assert_eq!(details.encoder_unit.as_deref(), Some("angles"));

@@ -1,14 +1,15 @@
 //! From the first heartbeat on until it can be steered, and again after a restart.
 
 use gimbald::bridge::settings::SystemId;
-use gimbald::gimbals::gremsy::packet;
-use gimbald::gimbals::operation::Restart;
+use gimbald::gimbals::gremsy::packet::{self, MessageRate};
+use gimbald::gimbals::operation::{Motors, Restart, YawMode};
 use gimbald::sim::faults::{Faults, FaultyPeer};
-use gimbald::wire::dialect::{HEARTBEAT_DATA, MavMessage, PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA};
+use gimbald::wire::dialect::{HEARTBEAT_DATA, PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA, PARAM_VALUE_DATA};
 use gimbald::wire::ids::message;
-use gimbald::wire::{FrameBuffer, MavId};
+use gimbald::wire::{DatagramFrames, MavId};
 
 use super::*;
+use crate::support::interception::{Intercepted, Interceptor, Passage};
 use crate::support::script::of;
 use crate::support::world::{GIMBAL, heartbeat};
 
@@ -49,7 +50,8 @@ fn statement_2_our_heartbeat_comes_first_and_every_second() {
     assert!((10..=12).contains(&beats.len()), "{}", beats.len());
 }
 
-/// Gimbal statement 3: "Heartbeats from compids 1, 100, 191 never bind as gimbal; 154 and 171–175 do."
+/// Gimbal statement 3: "Heartbeats from compids 1, 100, 191 never bind as gimbal; 154 and 171–175 do." Whoever beats as a gimbal
+/// is one, under whatever component the protocol notes (1.7), which win, leave to gimbals.
 #[test]
 #[rustfmt::skip]
 fn statement_3_which_components_are_gimbals() {
@@ -57,6 +59,9 @@ fn statement_3_which_components_are_gimbals() {
         (1,         2,    false),
         (100,       30,   false),
         (191,       18,   false),
+        (1,         26,   false),
+        (191,       26,   false),
+        (100,       26,   true),
         (154,       26,   true),
         (171,       26,   true),
         (172,       26,   true),
@@ -93,48 +98,30 @@ fn statement_4_a_second_gimbal_does_not_steal_the_binding() {
     assert_looks(&world, -20.0, 0.0);
 }
 
-/// Gimbal statement 6: "Motor-on, FOLLOW, home, 511 and 512 frames equal their golden frames."
+/// Gimbal statement 6: "Motor-on, FOLLOW, home, 511 and 512 frames equal their golden frames." What the core sends is what
+/// these frames are made of (`gimbals::gremsy::packet`), whole.
 #[test]
-fn statement_6_golden_frames() {
-    let golden = [
-        (
-            1,
-            "FD 20 00 00 02 01 BF 4C 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 80 3F 22 79 01 9A 6F EA",
-            packet::set_motors(GIMBAL, true),
-        ),
-        (
-            2,
-            "FD 20 00 00 03 01 BF 4C 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 40 23 79 01 9A 50 D5",
-            packet::follow(GIMBAL),
-        ),
-        (
-            3,
-            "FD 20 00 00 04 01 BF 4C 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 40 40 00 00 80 40 23 79 01 9A A8 33",
-            packet::reset(GIMBAL, ResetMode::PitchAndYaw),
-        ),
-        (
-            6,
-            "FD 20 00 00 06 01 BF 4C 00 00 00 80 8D 43 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 02 01 9A 6C 62",
-            packet::request_message(GIMBAL, 283),
-        ),
-    ];
-    for (_, text, command) in golden {
-        let expected: Vec<u8> =
-            text.split(' ').map(|byte| u8::from_str_radix(byte, 16).expect("hexadecimal")).collect();
-        let sent = FrameBuffer::default()
-            .encode_any(MANAGER, expected[4], &MavMessage::COMMAND_LONG(command))
-            .bytes()
-            .to_vec();
-        assert_eq!(sent, expected, "{text}");
-    }
-    // What asks for 283 is the golden frame but for its number, and 285 is asked for ten times a second.
+fn statement_6_what_is_sent_is_what_the_golden_frames_hold() {
     let silent = DeviceSettings { has_usual_streams: false, ..device(Generation::V2) };
     let (mut world, places) = switched_on(silent, GremsySettings::default());
     run(&mut world, places, 4 * SECOND);
     let asked = told(&mut world, places, command::REQUEST_MESSAGE);
     assert_eq!(asked[0], packet::request_message(GIMBAL, 283));
     let rates = told(&mut world, places, command::SET_MESSAGE_INTERVAL);
-    assert_eq!((rates[0].param1, rates[0].param2), (285.0, 100_000.0));
+    assert_eq!(rates[0], packet::set_message_rate(GIMBAL, 285, MessageRate::Hertz(10)));
+
+    let (mut world, places) = running(Generation::V1);
+    take_control(&mut world);
+    for (operation, expected) in [
+        (Operation::Motors(Motors::Off), packet::set_motors(GIMBAL, false)),
+        (Operation::Motors(Motors::On), packet::set_motors(GIMBAL, true)),
+        (Operation::SetYawMode(YawMode::Follow), packet::follow(GIMBAL)),
+        (Operation::Reset(ResetMode::PitchAndYaw), packet::reset(GIMBAL, ResetMode::PitchAndYaw)),
+    ] {
+        world.forget();
+        assert_eq!(operate(&mut world, places, operation.clone()), Some(Ok(())), "{operation:?}");
+        assert_eq!(orders(&mut world, places), (vec![expected], vec![]), "{operation:?}");
+    }
 }
 
 /// Gimbal statement 11: "`present` becomes true only after parameters are settled for 1 s and errors_count2 == 0."
@@ -164,10 +151,51 @@ fn statement_11_it_can_be_steered_when_it_is_ready_and_not_before() {
     }
 }
 
-/// Gimbal statement 12: "A parameter missing after 5 reads is marked non-existent and does not block readiness." Old firmware
-/// has not all of either table.
+/// Whose parameters have one of this name that never arrives.
+#[derive(Debug)]
+struct Lacking(&'static str);
+
+impl Interceptor for Lacking {
+    fn towards_core(&mut self, bytes: &[u8]) -> Passage {
+        let value = DatagramFrames::new(bytes).next_frame().and_then(|frame| frame.decode::<PARAM_VALUE_DATA>());
+        if value.is_some_and(|value| value.param_id.to_str() == Ok(self.0)) { Passage::Lost } else { Passage::Through }
+    }
+}
+
+/// Gimbal statement 12: "A parameter missing after 5 reads is marked non-existent and does not block readiness."
 #[test]
 fn statement_12_a_missing_parameter_does_not_keep_it_from_running() {
+    for (device, name) in [
+        (device(Generation::V1), "GYRO_LPF"),
+        (device(Generation::V1), "RC_TYPE"),
+        (device(Generation::V2), "RC_LIM_MIN_TILT"),
+        (with_firmware(Generation::V1, 7, 5, 6), "TRAVEL_MAX_PIT"),
+    ] {
+        let firmware = device.firmware;
+        let (mut world, places) = without_gimbal(GremsySettings::default());
+        world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
+        world.install(places.gimbal, Intercepted::new(Device::new(Timestamp::ZERO, device), Lacking(name)));
+        run(&mut world, places, 20 * SECOND);
+        assert_eq!(seen(&world).details.stage.as_deref(), Some("running"), "{firmware} without {name}");
+        let reads: Vec<PARAM_REQUEST_READ_DATA> = from_manager(&mut world, places);
+        let reads: Vec<&str> = reads.iter().map(|read| read.param_id.to_str().expect("a name")).collect();
+        assert_eq!(reads, [name; 5], "{firmware}");
+        let parameters = seen(&world).details.parameters;
+        assert!(parameters.len() > 20 && !parameters.contains_key(name), "{firmware} {parameters:?}");
+        // It does not exist, and is not asked for any more.
+        world.forget();
+        run(&mut world, places, 30 * SECOND);
+        let reads: Vec<PARAM_REQUEST_READ_DATA> = from_manager(&mut world, places);
+        assert_eq!(reads, [], "{firmware} {name}");
+        demand(&mut world, places, [-20.0, 10.0, f32::NAN, f32::NAN, 0.0]);
+        run(&mut world, places, 4 * SECOND);
+        assert_looks(&world, -20.0, 10.0);
+    }
+}
+
+/// Firmware with the older table of parameters is asked for nothing of the newer one.
+#[test]
+fn old_firmware_has_the_older_table() {
     let (mut world, places) = switched_on(with_firmware(Generation::V1, 7, 5, 6), GremsySettings::default());
     run(&mut world, places, 20 * SECOND);
     let seen = seen(&world);
@@ -225,7 +253,14 @@ fn streams_are_set_also_where_nothing_comes_by_default() {
 #[test]
 fn statement_32_a_reboot_is_no_loss_and_everything_is_said_again() {
     for generation in [Generation::V1, Generation::V2] {
-        let (mut world, places) = running(generation);
+        let (mut world, places) = switched_on(device(generation), GremsySettings::default());
+        run(&mut world, places, 16 * SECOND);
+        assert_eq!(seen(&world).details.stage.as_deref(), Some("running"), "{generation:?}");
+        let mut first_rates = stream_rates(&mut world, places);
+        // By its answer to that it was found out to speak v1, which it is known to do.
+        first_rates.retain(|(id, _)| generation == Generation::V2 || *id != 285.0);
+        let streams: &[f32] = if generation == Generation::V1 { &[158.0, 265.0] } else { &[158.0, 285.0] };
+        assert!(streams.iter().all(|id| first_rates.iter().any(|(told, _)| told == id)), "{first_rates:?}");
         demand(&mut world, places, [-30.0, 45.0, f32::NAN, f32::NAN, 0.0]);
         run(&mut world, places, 3 * SECOND);
         take_control(&mut world);
@@ -242,8 +277,7 @@ fn statement_32_a_reboot_is_no_loss_and_everything_is_said_again() {
         assert!(states.iter().all(|state| state == "alive"), "{states:?}");
 
         assert_eq!(seen(&world).details.stage.as_deref(), Some("running"), "{generation:?}");
-        let rates = told(&mut world, places, command::SET_MESSAGE_INTERVAL);
-        assert!(rates.iter().filter(|rate| rate.param1 == 158.0).count() >= 1, "{generation:?} {rates:?}");
+        assert_eq!(stream_rates(&mut world, places), first_rates, "{generation:?}");
         let lists: Vec<PARAM_REQUEST_LIST_DATA> = from_manager(&mut world, places);
         assert_eq!(lists.len(), 1);
         // Nothing moves it until somebody asks, and then its mode is said first.
@@ -258,6 +292,17 @@ fn statement_32_a_reboot_is_no_loss_and_everything_is_said_again() {
             assert_eq!(commands[0], packet::follow(GIMBAL));
         }
     }
+}
+
+/// What the gimbal was told of each stream last: the message, and its interval in microseconds.
+fn stream_rates(world: &mut World, places: Places) -> Vec<(f32, f32)> {
+    let mut rates: Vec<(f32, f32)> = Vec::new();
+    for told in told(world, places, command::SET_MESSAGE_INTERVAL) {
+        rates.retain(|(id, _)| *id != told.param1);
+        rates.push((told.param1, told.param2));
+    }
+    rates.sort_by(|one, other| one.0.total_cmp(&other.0));
+    rates
 }
 
 /// It does not come back: then it is lost.

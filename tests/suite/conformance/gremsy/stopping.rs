@@ -169,7 +169,11 @@ fn one_that_tells_that_it_turns_has_not_stopped() {
             let (mut world, places, deaf) = turning_about(Generation::V2, rates);
             deaf.setpoints.set(40);
             let not_done = operate(&mut world, places, operation.clone());
-            assert_eq!(not_done, Some(Err(NotDone::Operation(OperationError::StillTurning))), "{operation:?} {rates:?}");
+            assert_eq!(
+                not_done,
+                Some(Err(NotDone::Operation(OperationError::StillTurning))),
+                "{operation:?} {rates:?}"
+            );
             run(&mut world, places, 4 * SECOND);
             assert_rests(&mut world, places);
         }
