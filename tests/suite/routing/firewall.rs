@@ -84,6 +84,21 @@ fn d5_what_is_said_to_every_manager_reaches_no_gimbal() {
     }
     let mut warns = self::rig(Firewall::Warn);
     assert!(warns.deliver_amid_ours("ground", &command(GROUND, COMMAND_LONG, 195, (1, 0))).contains(&"gimbal"));
+    assert_eq!(warns.world.snapshot().conflicts, [""; 0], "it is for the managers, which do it");
+}
+
+/// R15: the conflict is shown, "but for 204, 205, 220, `MOUNT_CONFIGURE` and `MOUNT_CONTROL` to no component in particular,
+/// which are for the managers as well"; with `firewall = "warn"` each is.
+#[test]
+fn what_a_mount_is_told_by_everybody_is_a_conflict_where_it_arrives() {
+    for (firewall, shown) in [(Firewall::On, 0), (Firewall::Warn, 1)] {
+        for number in [204, 205, 220] {
+            let mut rig = rig(firewall);
+            let told = rig.deliver_amid_ours("ground", &command(GROUND, COMMAND_LONG, number, (1, 0)));
+            assert_eq!(told.contains(&"gimbal"), firewall == Firewall::Warn, "{number} {firewall:?} {told:?}");
+            assert_eq!(rig.world.snapshot().conflicts.len(), shown, "{number} {firewall:?}");
+        }
+    }
 }
 
 /// The firewall is about the devices that we manage, on whatever link they are, and about nothing else.

@@ -13,7 +13,7 @@ use gimbald::wire::dialect::{
 use gimbald::wire::ids::{CommandResult, GimbalFlags};
 
 use super::*;
-use crate::support::script::{NAN, quaternion, set_attitude, set_pitchyaw};
+use crate::support::script::{DENIED, NAN, quaternion, set_attitude, set_pitchyaw};
 use crate::support::world::GIMBAL;
 
 fn bytes(text: &str) -> Vec<u8> {
@@ -338,6 +338,23 @@ fn a_gimbal_that_was_handed_to_its_radio_control_is_told_nothing() {
     let (commands, setpoints) = orders(&mut world, places);
     assert_eq!((commands, setpoints), (vec![packet::hand_to_rc(GIMBAL)], vec![]));
     assert!(is_handed_over(&world), "{:?}", seen(&world).flags);
+}
+
+/// "DENIED, as its 283 tells of no RC inputs; by name (`radio-control`) 204 with mode 3 …, and no flag shows it, as 285 is its own"
+/// (`docs/families/gremsy.md`).
+#[test]
+fn a_gimbal_of_v2_is_handed_to_its_radio_control_by_name_only() {
+    let (mut world, places) = running(Generation::V2);
+    let given = command_long(MANAGER, 1000, &[0.0, 0.0, NAN, NAN, 256.0, 0.0, 0.0]);
+    assert_eq!(world.result_of(places.ground, GCS, &given), Some(DENIED));
+    run(&mut world, places, SECOND);
+    assert_eq!(orders(&mut world, places), (vec![], vec![]));
+
+    take_control(&mut world);
+    assert_eq!(operate(&mut world, places, Operation::RadioControl), Some(Ok(())));
+    run(&mut world, places, SECOND);
+    assert_eq!(orders(&mut world, places), (vec![packet::hand_to_rc(GIMBAL)], vec![]));
+    assert!(!is_handed_over(&world), "{:?}", seen(&world).flags);
 }
 
 fn is_handed_over(world: &World) -> bool {

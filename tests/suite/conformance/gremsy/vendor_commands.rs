@@ -58,15 +58,33 @@ fn each_command_does_what_the_maker_says() {
     }
 }
 
-/// Lock and follow are demands like any other: it stays, and keeps yaw to North or to the nose.
+/// Lock and follow are demands like any other: it stays, and keeps yaw to North or to the nose. They travel "as an angle with yaw
+/// from North or from the nose" (`docs/families/gremsy.md`): one of v1 is in LOCK only where it combines the autopilot's attitude.
 #[test]
 fn lock_and_follow_are_demands() {
-    for generation in [Generation::V1, Generation::V2] {
+    for (generation, combines) in [(Generation::V1, false), (Generation::V1, true), (Generation::V2, true)] {
         let (mut world, places) = running(generation);
+        take_control(&mut world);
+        assert_eq!(operate(&mut world, places, Operation::SetCombinedAttitude(combines)), Some(Ok(())));
+        assert_eq!(ask(&mut world, places, &Asked::ReleaseControl), Some(Ok(())));
+        world.forget();
         assert_eq!(answers(&mut world, places, GCS, 31011, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]), [ACCEPTED]);
         assert!(seen(&world).flags.iter().any(|flag| flag == "yaw_lock"), "{generation:?}");
         assert_eq!(answers(&mut world, places, GCS, 31011, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0]), [ACCEPTED]);
         assert!(!seen(&world).flags.iter().any(|flag| flag == "yaw_lock"), "{generation:?}");
+
+        let (commands, setpoints) = orders(&mut world, places);
+        let (modes, angles): (Vec<_>, Vec<_>) = commands.into_iter().partition(|command| command.command == 31011);
+        let (locks, follows) = (packet::lock(GIMBAL), packet::follow(GIMBAL));
+        let expected = match (generation, combines) {
+            (Generation::V1, false) => vec![follows],
+            (Generation::V1, true) => vec![locks, follows],
+            (Generation::V2, _) => vec![],
+        };
+        assert_eq!(modes, expected, "{generation:?} {combines}");
+        assert!(angles.iter().all(|angle| (angle.command, angle.param6) == (205, 1.0)), "{angles:?}");
+        let is_v1 = generation == Generation::V1;
+        assert_eq!((angles.is_empty(), setpoints.is_empty()), (!is_v1, is_v1), "{generation:?}");
     }
 }
 
@@ -221,5 +239,9 @@ fn what_others_send_straight_to_it_is_kept_away() {
             .iter()
             .filter(|arrival| matches!(arrival.source(), GCS | AUTOPILOT) && matches!(arrival.id(), 75 | 76));
         assert_eq!(foreign.count() > 0, firewall == Firewall::Warn, "{firewall:?}");
+        for sender in [GCS, AUTOPILOT] {
+            let names_it = |conflict: &String| conflict.contains(&sender.to_string());
+            assert!(world.snapshot().conflicts.iter().any(names_it), "{firewall:?} {sender}");
+        }
     }
 }
