@@ -1,4 +1,5 @@
 mod any_gimbal;
+mod reading;
 
 use std::time::Duration;
 
@@ -163,103 +164,6 @@ fn is_list(message: &MavMessage) -> bool {
     matches!(message, MavMessage::PARAM_REQUEST_LIST(_))
 }
 
-/// "collect PARAM_VALUE; when no PARAM_VALUE for 1 s" (gimbals 1.2): the list, a second of silence, and another before it
-/// is settled.
-#[test]
-fn a_whole_list_is_settled_a_second_after_its_last_value() {
-    let mut line = Line::new(&NAMES);
-
-    line.parameters.refresh(line.now, GIMBAL);
-    line.run_for(5_000);
-
-    assert_eq!(line.sent.len(), 1, "{:?}", line.sent);
-    assert_eq!(line.done, [(1_010, ParameterOutput::Settled)]);
-    assert_eq!(line.parameters.values().collect::<Vec<_>>(), [("ALPHA", 10.0), ("BETA", 11.0), ("GAMMA", 12.0)]);
-}
-
-/// Gimbal statement 12: "A parameter missing after 5 reads is marked non-existent and does not block readiness." Requests
-/// go by the name (index −1).
-#[test]
-fn statement_12_what_does_not_come_is_read_five_times() {
-    let mut line = Line::new(&["BETA"]);
-
-    line.parameters.refresh(line.now, GIMBAL);
-    line.run_for(20_000);
-
-    let round = |at: u64| [(at, "ALPHA".to_owned(), -1), (at + 10, "GAMMA".to_owned(), -1)];
-    let named: Vec<_> = [1_000, 1_510].into_iter().flat_map(round).collect();
-    assert_eq!(line.reads()[..4], named);
-    assert_eq!(line.reads().len(), 10);
-    assert!(line.parameters.is_missing("ALPHA") && line.parameters.is_missing("GAMMA"));
-    assert!(!line.parameters.is_missing("BETA"));
-    // The last rounds went by the index, which was answered with another name.
-    assert_eq!(line.done, [(4_040, ParameterOutput::Settled)]);
-}
-
-/// "send `param_index = −1` with the name; fall back to index mode if nothing answers" (gimbals 1.6).
-#[test]
-fn where_names_are_not_answered_the_index_is_tried() {
-    let mut line = Line::new(&NAMES);
-    line.lost = |_, message| match message {
-        MavMessage::PARAM_REQUEST_READ(read) => read.param_index < 0,
-        message => is_list(message),
-    };
-
-    line.parameters.refresh(line.now, GIMBAL);
-    line.run_for(20_000);
-
-    let last: Vec<i16> = line.reads()[6..].iter().map(|(_, _, index)| *index).collect();
-    assert_eq!(last, [0, 1, 2]);
-    assert_eq!(line.parameters.value("GAMMA"), Some(12.0));
-    assert!(line.parameters.is_settled());
-}
-
-/// A list that is lost is asked for again, and single values that are lost are read.
-#[test]
-fn what_is_lost_of_the_list_is_read() {
-    let mut line = Line::new(&NAMES);
-    line.lost = |number, message| number == 0 && is_list(message);
-
-    line.parameters.refresh(line.now, GIMBAL);
-    line.run_for(20_000);
-
-    assert!(line.sent.iter().filter(|(_, message)| is_list(message)).count() == 2, "{:?}", line.sent);
-    assert_eq!(line.done, [(2_010, ParameterOutput::Settled)]);
-}
-
-/// A gimbal without parameters is found out in bounded time.
-#[test]
-fn a_gimbal_without_parameters_settles_too() {
-    let mut line = Line::new(&[]);
-
-    line.parameters.refresh(line.now, GIMBAL);
-    line.run_for(20_000);
-
-    assert_eq!(line.done.len(), 1);
-    assert!(line.done[0].0 < 6_000, "{:?}", line.done);
-    assert_eq!(line.parameters.values().count(), 0);
-}
-
-/// Somebody else has the gimbal tell its values without end.
-#[test]
-fn what_others_ask_for_does_not_keep_it_from_settling() {
-    let mut line = Line::new(&["BETA", "GAMMA"]);
-    let name = CharArray::from("BETA");
-    let value = PARAM_VALUE_DATA { param_value: 11.0, param_count: 2, param_index: 0, param_id: name, param_type: 4 };
-    let bytes = encode_to_vec(GIMBAL, 0, &value);
-
-    line.parameters.refresh(line.now, GIMBAL);
-    for _ in 0..6_000 {
-        line.run_for(5);
-        let frame = DatagramFrames::new(&bytes).next_frame().expect("a frame");
-        line.parameters.handle_received(line.now, &frame);
-    }
-
-    let settled = line.done.first().map(|(at, _)| *at);
-    assert!(settled.is_some_and(|at| at < 26_000), "{:?}", line.done);
-    assert!(line.parameters.is_missing("ALPHA"));
-}
-
 /// Gimbal statement 13: "PARAM_SET writes an int16 number as its float value with param_type 4; the golden PARAM_SET frame
 /// matches."
 #[test]
@@ -361,112 +265,6 @@ fn what_others_set_is_known() {
 }
 
 #[test]
-fn a_refresh_is_answered_when_everything_was_read() {
-    let mut line = Line::settled(&NAMES);
-
-    line.parameters.refresh_for(line.now, ID);
-    line.parameters.refresh_for(line.now, OperationId(8));
-    line.run_for(5_000);
-
-    assert_eq!(line.sent.iter().filter(|(_, message)| is_list(message)).count(), 1);
-    let done = |id| (21_010, ParameterOutput::Done { id, result: Ok(()) });
-    assert_eq!(line.done, [(21_010, ParameterOutput::Settled), done(ID), done(OperationId(8))]);
-}
-
-/// "The daemon can read, cache and set a gimbal's parameters itself, with retry": what is known of before counts for nothing
-/// when they are read again, since it may have been changed with the maker's own program.
-#[test]
-fn a_refresh_reads_what_is_known_once_more() {
-    let mut line = Line::settled(&NAMES);
-    line.change_unheard("BETA", 99.0);
-    line.lost = |_, message| is_list(message);
-
-    line.parameters.refresh_for(line.now, ID);
-    line.run_for(10_000);
-
-    let read = |at: u64, name: &str| (at, name.to_owned(), -1);
-    assert_eq!(line.reads(), [read(23_000, "ALPHA"), read(23_010, "BETA"), read(23_020, "GAMMA")]);
-    assert_eq!(line.done.last(), Some(&(24_020, ParameterOutput::Done { id: ID, result: Ok(()) })));
-    assert_eq!(line.parameters.values().collect::<Vec<_>>(), [("ALPHA", 10.0), ("BETA", 99.0), ("GAMMA", 12.0)]);
-}
-
-/// What it told beyond its maker's names is read again by its name, too.
-#[test]
-fn a_refresh_reads_what_no_table_has() {
-    let mut line = Line::settled(&NAMES);
-    line.lost = |_, message| is_list(message);
-    let value = PARAM_VALUE_DATA {
-        param_value: 5.0,
-        param_count: 4,
-        param_index: 3,
-        param_id: CharArray::from("DELTA"),
-        param_type: 4,
-    };
-    line.hear(&encode_to_vec(GIMBAL, 0, &value));
-
-    line.parameters.refresh_for(line.now, ID);
-    line.run_for(20_000);
-
-    let of_delta: Vec<i16> =
-        line.reads().into_iter().filter(|(_, name, _)| name == "DELTA").map(|(_, _, index)| index).collect();
-    assert_eq!(of_delta, [-1; 5]);
-    let result = Err(OperationError::NoEffect("1 of its 4 parameters did not come in time".to_owned()));
-    assert_eq!(line.done.last().map(|(_, done)| done), Some(&ParameterOutput::Done { id: ID, result }));
-}
-
-/// Who asks for a reading of which nothing comes is told so, and what was known stays known.
-#[test]
-fn a_refresh_without_an_answer_is_not_done() {
-    for (names, error) in [(&NAMES[..], OperationError::NoAnswer), (&[], OperationError::NoParameters)] {
-        let mut line = Line::settled(names);
-        let known: Vec<(String, f64)> = line.parameters.by_name().into_iter().collect();
-        line.lost = |_, _| true;
-
-        line.parameters.refresh_for(line.now, ID);
-        line.run_for(20_000);
-
-        let results: Vec<_> = line.done.drain(..).map(|(_, done)| done).collect();
-        assert_eq!(results, [ParameterOutput::Settled, ParameterOutput::Done { id: ID, result: Err(error) }]);
-        assert_eq!(line.parameters.by_name().into_iter().collect::<Vec<_>>(), known);
-    }
-}
-
-/// A twentieth of all that is said is lost either way: what was changed meanwhile is known all the same.
-#[test]
-fn a_refresh_on_a_bad_line_is_whole() {
-    for seed in 1..=50 {
-        let mut line = Line::settled(&NAMES);
-        for (at, name) in NAMES.iter().enumerate() {
-            line.change_unheard(name, 20.0 + at as f32);
-        }
-        line.loss = Some((0.05, Random::new(seed)));
-
-        line.parameters.refresh_for(line.now, ID);
-        line.run_for(20_000);
-
-        assert_eq!(line.done.last().map(|(_, done)| done), Some(&ParameterOutput::Done { id: ID, result: Ok(()) }));
-        let values: Vec<f64> = line.parameters.values().map(|(_, value)| value).collect();
-        assert_eq!(values, [20.0, 21.0, 22.0], "{seed}");
-    }
-}
-
-/// Every queue has a bound: who asks for one more reading than are waited for is told so at once, and the others have theirs.
-#[test]
-fn so_many_wait_for_a_refresh_and_no_more() {
-    let mut line = Line::settled(&NAMES);
-    for id in 0..9 {
-        line.parameters.refresh_for(line.now, OperationId(id));
-    }
-    line.settle();
-    let busy = ParameterOutput::Done { id: OperationId(8), result: Err(OperationError::Busy) };
-    assert_eq!(line.done, [(20_000, busy)]);
-    line.done.clear();
-    line.run_for(5_000);
-    let done = |id| (21_010, ParameterOutput::Done { id: OperationId(id), result: Ok(()) });
-    assert_eq!(line.done[1..], (0..8).map(done).collect::<Vec<_>>());
-}
-
-#[test]
 fn what_cannot_be_set_is_refused_at_once() {
     let mut line = Line::settled(&NAMES);
     let mut refused = |values: &[(&str, f64)]| {
@@ -507,6 +305,24 @@ fn what_was_asked_of_a_gimbal_that_is_gone_is_not_done() {
     let gone = |id| (20_000, ParameterOutput::Done { id, result: Err(OperationError::NotThere) });
     assert_eq!(line.done, [gone(ID), gone(OperationId(8))]);
     assert_eq!(line.parameters.poll_timeout(), None);
+}
+
+/// What is known is of the device that told it: of the next one nothing is known, and what was asked of the first is not done.
+#[test]
+fn nothing_is_known_of_another_device() {
+    let mut line = Line::settled(&NAMES);
+    line.lost = |_, _| true;
+    line.parameters.set(line.now, ID, &[("ALPHA", 1.0)]);
+    line.parameters.listen(GIMBAL);
+    line.settle();
+    assert_eq!((line.parameters.values().count(), line.done.len()), (3, 0), "it is the same one");
+
+    line.parameters.listen(MavId::new(1, 171));
+    line.run_for(5_000);
+
+    assert_eq!(line.parameters.values().count(), 0);
+    assert_eq!(line.done, [(20_000, ParameterOutput::Done { id: ID, result: Err(OperationError::NotThere) })]);
+    assert_eq!(line.sent.len(), 1, "{:?}", line.sent);
 }
 
 fn read_by_ground_station() -> Vec<u8> {

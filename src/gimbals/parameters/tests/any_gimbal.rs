@@ -111,6 +111,27 @@ fn what_is_missing_is_read_by_its_index() {
     assert_eq!(results(&line), [(ID, Ok(()))]);
 }
 
+/// "Re-request missing indices": of each list that is asked for, although they are known from the one before; but not those
+/// that somebody else was told meanwhile.
+#[test]
+fn what_is_missing_of_the_next_list_is_read_too() {
+    let mut line = many(5);
+    line.parameters.refresh_for(line.now, ID);
+    line.run_for(3_000);
+    assert_eq!((line.parameters.values().count(), line.reads()), (5, vec![]));
+    line.parameters.refresh_for(line.now, ID_8);
+    line.settle();
+    // Of this one only the first two have come.
+    line.run_for(5);
+    line.gimbal.forget_questions();
+    line.run_for(1_050);
+    line.hear(&told("P003", 3.0, (3, 5)));
+    line.run_for(5_000);
+
+    assert_eq!(line.reads(), [(4_005, String::new(), 2), (4_105, String::new(), 4)]);
+    assert_eq!(results(&line), [(ID, Ok(())), (ID_8, Ok(()))]);
+}
+
 /// With 20 % lost either way all of them come, whatever is lost, and each is set, but where all five tries were lost, which is
 /// one in 160.
 #[test]
