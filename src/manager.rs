@@ -333,12 +333,6 @@ impl GimbalManager {
         self.outputs.pop_front()
     }
 
-    /// Stops every rotation at once: the process is to end.
-    pub fn handle_shutdown(&mut self, now: Timestamp, around: Surroundings<'_>) {
-        self.tracking.stop_rates(now);
-        self.carry_out(now, around);
-    }
-
     pub fn settings(&self) -> &GimbalSettings {
         &self.settings
     }

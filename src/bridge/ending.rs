@@ -1,11 +1,12 @@
 //! The end of the process: what turns is stopped, then goodbye is said.
 //!
 //! A word may be lost, and after us nobody repeats it: a gimbal that may be turning is told to stop for as long as the
-//! process may take for its end (`daemon/shutdown.rs`), whether it answers or not.
+//! process may take for its end (`daemon/shutdown.rs`), whether it answers or not. What we turn by its angles stands when
+//! nothing more is told. Nobody is listened to any more, so nothing is asked again.
 
 use std::time::Duration;
 
-use super::{Bridge, heartbeat, surroundings};
+use super::{Bridge, heartbeat};
 use crate::timestamp::Timestamp;
 
 /// What may be turning is told to stop so often …
@@ -30,15 +31,11 @@ impl Bridge {
         self.channels.keep_control();
         self.channels.lift_limits();
         let mut turning = 0;
-        let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
-        for (at, gimbal) in self.roster.iter_mut().enumerate() {
+        for (at, gimbal) in self.roster.iter().enumerate() {
             if at < 64 && gimbal.may_be_turning() {
                 turning |= 1 << at;
-            } else {
-                gimbal.manager.handle_shutdown(now, around);
             }
         }
-        self.carry_out(now);
         self.asked.end_all(&mut self.outbox);
         self.shutting_down = true;
         if turning == 0 || self.identity.system().is_none() {
@@ -52,7 +49,6 @@ impl Bridge {
     /// What is due at the end: nothing is listened to, and nobody is told anything new.
     pub(super) fn handle_ending(&mut self, now: Timestamp) {
         if let Some(Stopping { turning, .. }) = self.stopping {
-            self.transactions.handle_timeout(now);
             for (at, gimbal) in self.roster.iter_mut().enumerate() {
                 if is_in(turning, at) {
                     gimbal.driver.handle_timeout(now);
@@ -67,7 +63,7 @@ impl Bridge {
         let stopping = self.stopping.iter().flat_map(|stopping| {
             let drivers = self.roster.iter().enumerate().filter(|(at, _)| is_in(stopping.turning, *at));
             let drivers = drivers.filter_map(|(_, gimbal)| gimbal.driver.poll_timeout());
-            drivers.chain(self.transactions.poll_timeout()).chain([stopping.next])
+            drivers.chain([stopping.next])
         });
         stopping.chain(self.channels.poll_output_timeout()).min()
     }

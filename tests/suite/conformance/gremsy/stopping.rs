@@ -4,11 +4,15 @@
 use std::cell::Cell;
 use std::rc::Rc;
 
+use gimbald::bridge::settings::Transport;
 use gimbald::geometry::AngularRate;
 use gimbald::gimbals::gremsy::packet;
 use gimbald::gimbals::operation::{OperationError, Restart, YawMode};
 use gimbald::manager::asked::NotDone;
-use gimbald::wire::dialect::{COMMAND_ACK_DATA, MOUNT_ORIENTATION_DATA, MavMessage, MessageData};
+use gimbald::wire::dialect::{
+    COMMAND_ACK_DATA, CharArray, HEARTBEAT_DATA, MOUNT_ORIENTATION_DATA, MavMessage, MessageData,
+    PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA, PARAM_VALUE_DATA,
+};
 use gimbald::wire::{DatagramFrames, FrameBuffer};
 
 use super::*;
@@ -370,4 +374,56 @@ fn what_it_answers_to_another_does_not_tell_that_it_has_stopped() {
     deaf.setpoints.set(0);
     run(&mut world, places, 4 * SECOND);
     assert_eq!(world.stored_turning, [""; 0]);
+}
+
+/// One that hears neither a question for a parameter nor what moves it.
+struct HardOfHearing(Deaf);
+
+impl Interceptor for HardOfHearing {
+    fn towards_peer(&mut self, bytes: &[u8]) -> Passage {
+        let id = u32::from_le_bytes([bytes[7], bytes[8], bytes[9], 0]);
+        let asks = [PARAM_REQUEST_READ_DATA::ID, PARAM_REQUEST_LIST_DATA::ID].contains(&id);
+        if asks { Passage::Lost } else { self.0.towards_peer(bytes) }
+    }
+}
+
+/// "Then one POWEROFF heartbeat": it is the last word and in time on a slow line too, however much else waits for that, such as
+/// the parameters of a gimbal that an earlier run left turning, which are still asked for.
+#[test]
+fn at_the_end_the_goodbye_waits_for_no_question() {
+    for generation in [Generation::V1, Generation::V2] {
+        let gimbal = GimbalSettings { family: Family::Gremsy, ..GimbalSettings::found("camera".to_owned()) };
+        let left_turning = vec!["camera\t1/154\tgremsy".to_owned()];
+        let mut settings = Settings { gimbals: vec![gimbal], left_turning, ..three_links() };
+        settings.links[1].transport = Transport::Serial { baud: 19_200 };
+        let (mut world, places) = World::empty(settings.clone());
+        world.kill();
+        world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
+        let deaf = Deaf { setpoints: Rc::new(Cell::new(u32::MAX)), ..Deaf::default() };
+        let device = Device::new(Timestamp::ZERO, device(generation));
+        world.install(places.gimbal, Intercepted::new(device, HardOfHearing(deaf)));
+        world.run_for(10 * SECOND);
+        world.start(settings);
+        let questions = |world: &mut World| from_manager::<PARAM_REQUEST_READ_DATA>(world, places).len();
+        run(&mut world, places, 2 * SECOND);
+        // One is told to somebody else; by that it is known which there are.
+        let param_id = CharArray::from("STIFF_TILT");
+        let value = PARAM_VALUE_DATA { param_value: 45.0, param_count: 80, param_index: 40, param_id, param_type: 4 };
+        world.send(places.gimbal, GIMBAL, &MavMessage::PARAM_VALUE(value));
+        while questions(&mut world) == 0 {
+            run(&mut world, places, SECOND / 100);
+            assert!(world.now < Timestamp::from_secs(20), "{generation:?}");
+        }
+        world.forget();
+        let ended = world.now;
+
+        world.input(Input::Shutdown);
+        world.run_for(SECOND / 2);
+
+        assert!(questions(&mut world) > 5, "{generation:?}: the line was full");
+        let last = world.arrivals(places.gimbal).last().expect("the goodbye");
+        assert_eq!(last.decode::<HEARTBEAT_DATA>().system_status, 7, "{generation:?}");
+        assert!(last.at - ended < SECOND / 2, "{generation:?}: after {:?}", last.at - ended);
+        assert!(world.bridge.is_finished());
+    }
 }

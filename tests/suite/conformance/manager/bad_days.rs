@@ -4,17 +4,19 @@ use crate::support::script::ground_heartbeat;
 use gimbald::bridge::Input;
 use gimbald::bridge::settings::{Settings, Transport};
 use gimbald::manager::settings::ControlSettings;
+use gimbald::timestamp::Timestamp;
 use gimbald::wire::MavId;
-use gimbald::wire::dialect::{HEARTBEAT_DATA, MavMessage};
+use gimbald::wire::dialect::{COMMAND_LONG_DATA, HEARTBEAT_DATA, MavMessage};
 
+use super::frames::turn_vehicle;
 use super::{
     COMPANION, NO_ANGLES, SECOND, Setpoint, assert_near, look, run_looking, setpoints, with_gimbal, with_gimbal_that,
 };
 use crate::support::script::{
     ACCEPTED, DENIED, NAN, configure, device_information, device_status, gimbal_heartbeat, pitch_yaw_deg, pitchyaw,
-    px4_heartbeat, set_pitchyaw, take_control, usual_capabilities,
+    px4_heartbeat, set_pitchyaw, take_control, to, usual_capabilities,
 };
-use crate::support::world::{AUTOPILOT, GCS, GIMBAL, World, three_links};
+use crate::support::world::{AUTOPILOT, Arrival, GCS, GIMBAL, World, three_links};
 
 /// D7: "on … SIGTERM zero is sent at once", and nothing else is what the gimbal hears until the goodbye, also when its line
 /// is slow and the client goes on.
@@ -44,6 +46,67 @@ fn d7_at_the_end_no_demand_follows_the_zero() {
         setpoints[1..].iter().map(|(_, told)| [told.angular_velocity_y, told.angular_velocity_z]).collect();
     assert!(after.len() >= 5 && after.iter().all(|rates| *rates == [0.0, 0.0]), "{after:?}");
     assert!(world.bridge.is_finished());
+}
+
+/// "Then one POWEROFF heartbeat": the process ends when a slow line has it too, behind the frame that is on the wire.
+#[test]
+fn item_179_the_end_waits_for_a_slow_line() {
+    let mut settings = three_links();
+    settings.links[1].transport = Transport::Serial { baud: 9_600 };
+    let (mut world, places) = with_gimbal_that(usual_capabilities(), settings);
+    world.run_for(SECOND);
+    world.forget();
+    world.send(places.ground, GCS, &to(GIMBAL, pitchyaw(0.0, 0.0, NAN, NAN, 44.0)));
+
+    world.input(Input::Shutdown);
+
+    let ids = |world: &World| -> Vec<u32> { world.arrivals(places.gimbal).iter().map(Arrival::id).collect() };
+    assert_eq!((ids(&world), world.bridge.is_finished()), (vec![76], false));
+    world.run_for(SECOND / 20);
+    assert_eq!((ids(&world), world.bridge.is_finished()), (vec![76, 0], true));
+}
+
+/// Nobody is listened to at the end, so what was asked of others is not asked again: only zeros and goodbyes are heard.
+#[test]
+fn d7_at_the_end_nobody_is_asked_again() {
+    let (mut world, places) = with_gimbal();
+    let asked = |world: &mut World| world.take_messages::<COMMAND_LONG_DATA>(places.autopilot).len();
+    world.send(places.autopilot, AUTOPILOT, &px4_heartbeat());
+    world.forget();
+    // It says nothing of its position, and is asked for that.
+    while asked(&mut world) == 0 {
+        world.send(places.ground, GCS, &turn(0.5));
+        run_looking(&mut world, places, SECOND / 10, 0.0, 0.0);
+        assert!(world.now < Timestamp::from_secs(10));
+    }
+    run_looking(&mut world, places, SECOND / 5, 0.0, 0.0);
+
+    world.input(Input::Shutdown);
+    world.run_for(2 * SECOND);
+
+    assert_eq!(asked(&mut world), 0, "500 ms later it would be asked again");
+    assert_eq!(setpoints(&mut world, places).last().map(|(_, told)| told.angular_velocity_z), Some(0.0));
+    assert!(world.bridge.is_finished());
+}
+
+/// D7: what the gimbal cannot turn by itself we turn by its angles. At the end it is told no more, and stands where it was told
+/// to look last; nothing is waited for.
+#[test]
+fn d7_at_the_end_what_is_turned_by_its_angles_is_told_no_more() {
+    let (mut world, places) = with_gimbal();
+    look(&mut world, places, 0.0, 0.0);
+    turn_vehicle(&mut world, places, 90.0);
+    // To the right over ground; this gimbal takes its yaw from the nose.
+    world.send(places.ground, GCS, &set_pitchyaw(NAN, NAN, 0.0, 0.2, 92));
+    run_looking(&mut world, places, SECOND, 0.0, 0.0);
+    assert_eq!(world.snapshot().gimbals[0].setpoint.as_ref().map(|told| told.mode.as_str()), Some("angle"));
+    world.forget();
+
+    world.input(Input::Shutdown);
+
+    assert!(world.bridge.is_finished());
+    let heard = world.arrivals(places.gimbal);
+    assert_eq!(heard.iter().map(Arrival::id).collect::<Vec<_>>(), [0], "the goodbye");
 }
 
 /// D7: a rotation does not outlive a restart of the gimbal, its cable, or a time in which it is not heard, also where the
