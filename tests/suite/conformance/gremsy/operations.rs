@@ -37,7 +37,13 @@ fn motors_off_and_on() {
         for (motors, on, mode) in [(Motors::Off, false, ControlMode::Off), (Motors::On, true, ControlMode::Reset)] {
             world.forget();
             assert_eq!(operate(&mut world, places, Operation::Motors(motors)), Some(Ok(())), "{generation:?} {on}");
-            assert_eq!(seen(&world).details.motors_on, Some(on), "{generation:?}");
+            let details = seen(&world).details;
+            let shown = match generation {
+                _ if !on => "off",
+                Generation::V1 => "follow",
+                Generation::V2 => "reset",
+            };
+            assert_eq!((details.motors_on, details.mode.as_deref()), (Some(on), Some(shown)), "{generation:?}");
             let (commands, setpoints) = orders(&mut world, places);
             match generation {
                 Generation::V1 => assert_eq!((commands, setpoints), (vec![packet::set_motors(GIMBAL, on)], vec![])),
@@ -457,6 +463,44 @@ fn a_demand_ends_what_is_being_changed() {
         world.answers.iter().find(|(id, _)| *id == OperationId(77)).map(|(_, answer)| answer.clone()),
         failed(OperationError::NoEffect(text))
     );
+}
+
+/// Everything asked has one answer. In v2 modes are taken one at a time: who asks for another one meanwhile is told so, and
+/// neither loses the first nor takes its place; those that wait until it has stopped are no exception.
+#[test]
+fn modes_are_taken_one_at_a_time() {
+    let rate = gimbald::geometry::AngularRate::from_degrees_per_second;
+    let turn = Asked::Turn { roll: None, pitch: rate(0.0), yaw: rate(15.0), yaw_frame: YawFrame::Vehicle };
+    for (turns, second) in [(false, Operation::Motors(Motors::On)), (true, Operation::Mapping)] {
+        let (mut world, places) = controlled(Generation::V2);
+        if turns {
+            world.ask_by_name("camera", &turn);
+            run(&mut world, places, SECOND);
+        }
+        let lock = Asked::Operation(Operation::SetYawMode(YawMode::Lock));
+        world.answers.clear();
+        let ids = [lock, Asked::Operation(second.clone())].map(|asked| world.ask_by_name("camera", &asked));
+        run(&mut world, places, 8 * SECOND);
+
+        let busy = Err(NotDone::Operation(OperationError::Busy));
+        let mut answers = world.answers.clone();
+        answers.sort_by_key(|(id, _)| id.0);
+        assert_eq!(answers, [(ids[0], Ok(())), (ids[1], busy)], "{second:?}");
+        assert_eq!(seen(&world).details.mode.as_deref(), Some("lock"), "{second:?}");
+    }
+}
+
+/// In v2 a reset is a direction that is said three times: the next one takes its place, and each has its answer.
+#[test]
+fn a_reset_takes_the_place_of_the_one_before() {
+    let (mut world, places) = controlled(Generation::V2);
+    world.answers.clear();
+    let ids = [ResetMode::PitchDownUp, ResetMode::PitchAndYaw]
+        .map(|mode| world.ask_by_name("camera", &Asked::Operation(Operation::Reset(mode))));
+    run(&mut world, places, 4 * SECOND);
+
+    assert_eq!(world.answers, ids.map(|id| (id, Ok(()))));
+    assert_looks(&world, 0.0, 0.0);
 }
 
 /// A yaw from the nose only.
