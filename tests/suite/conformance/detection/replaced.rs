@@ -41,3 +41,20 @@ fn another_family_in_the_place_of_one_that_was_lost_is_found_out() {
         }
     }
 }
+
+/// D2: "a v2 device: its own component id … Any other gimbal: 1..6", which is kept for it: "whoever learned an id goes by it for
+/// good", also when a v2 device was there meanwhile.
+#[test]
+fn one_that_comes_back_after_a_v2_device_has_the_id_that_it_had() {
+    for kind in ["mavlink_v1", "gremsy v1"] {
+        let (mut world, places) = World::empty(three_links());
+        world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
+        for (kind, device_id) in [(kind, 1), ("mavlink_v2", 154), (kind, 1)] {
+            install(&mut world, places, kind);
+            run(&mut world, places, 25 * SECOND);
+            assert_eq!(world.snapshot().gimbals[0].device_id, Some(device_id), "{kind}");
+            world.remove(places.gimbal);
+            run(&mut world, places, 25 * SECOND);
+        }
+    }
+}

@@ -6,9 +6,9 @@ use gimbald::gimbals::settings::GimbalSettings;
 use gimbald::wire::MavId;
 use gimbald::wire::dialect::{GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA, MavMessage};
 
-use super::{Rig, SECOND, SECOND_GIMBAL, four_links};
-use crate::support::script::{device_information, of, px4_heartbeat, usual_capabilities};
-use crate::support::world::{AUTOPILOT, GIMBAL, three_links};
+use super::{Rig, SECOND, SECOND_GIMBAL, Setpoint, four_links};
+use crate::support::script::{ACCEPTED, NAN, command_long, device_information, of, px4_heartbeat, usual_capabilities};
+use crate::support::world::{AUTOPILOT, GCS, GIMBAL, MANAGER, three_links};
 
 /// Protocol notes 1.7: 1 is the autopilot's component id, 2 to 6 belong to gimbals without MAVLink, and system 0 is nobody's.
 /// What speaks like a gimbal under such an id is none of ours, and neither is an autopilot, whatever its id, that tells of
@@ -189,6 +189,70 @@ fn d1_a_lost_gimbal_has_no_successor_on_another_line() {
     rig.world.forget();
     rig.speak_for(SECOND, &[(rig.peer, SECOND_GIMBAL)]);
     assert_eq!(rig.states(), [(191, 5), (192, 4)], "it is missed");
+}
+
+/// An entry follows its device to another id on its line; who has another id on another line is another gimbal, also when the
+/// entry's is lost.
+#[test]
+fn d1_the_entry_of_a_lost_gimbal_goes_to_none_on_another_line() {
+    let entry = GimbalSettings::found("camera".to_owned());
+    let mut rig = Rig::new(Settings { gimbals: vec![entry], ..four_links() });
+    rig.introduce(rig.gimbals, GIMBAL);
+    rig.speak_for(SECOND, &[(rig.gimbals, GIMBAL)]);
+    rig.world.run_for(5 * SECOND);
+    assert_eq!(rig.world.snapshot().gimbals[0].state, "lost");
+    rig.introduce(rig.peer, SECOND_GIMBAL);
+
+    rig.speak_for(20 * SECOND, &[(rig.peer, SECOND_GIMBAL)]);
+
+    assert_eq!(rig.managed(), [(191, "1/154".to_owned()), (192, "1/171".to_owned())]);
+    assert_eq!(rig.world.snapshot().gimbals[0].state, "lost", "it is missed");
+}
+
+/// The entry follows its device however often it changes its id, also to one that it had before.
+#[test]
+fn d1_the_entry_follows_a_device_that_changes_its_component_id_again_and_again() {
+    let entry = GimbalSettings::found("camera".to_owned());
+    let mut rig = Rig::new(Settings { gimbals: vec![entry], ..three_links() });
+    for turn in 0..4 {
+        for device in [GIMBAL, SECOND_GIMBAL] {
+            rig.introduce(rig.gimbals, device);
+            rig.speak_for(5 * SECOND, &[(rig.gimbals, device)]);
+            assert_eq!(rig.managed(), [(191, device.to_string())], "turn {turn}");
+        }
+    }
+}
+
+/// "Who came to its link since is told to stop", also who has no place of his own: the fifth takes that of a gimbal that
+/// stands, so that the one that may be turning is still waited for, and may be the fifth.
+#[test]
+fn d1_the_place_of_a_gimbal_that_may_be_turning_is_the_last_to_be_given_up() {
+    let mut rig = Rig::new(three_links());
+    // Each with a number of its own.
+    let introduce = |rig: &mut Rig, component: u8| {
+        let information = device_information(rig.world.now, usual_capabilities());
+        let information = GIMBAL_DEVICE_INFORMATION_DATA { uid: component.into(), ..information };
+        let device = MavId::new(1, component);
+        rig.world.send(rig.gimbals, device, &MavMessage::GIMBAL_DEVICE_INFORMATION(information));
+    };
+    for component in [154, 171, 172, 173] {
+        introduce(&mut rig, component);
+    }
+    let turn = command_long(MANAGER, 1000, &[NAN, NAN, 0.0, 10.0, 44.0, 0.0, 0.0]);
+    assert_eq!(rig.world.result_of(rig.ground, GCS, &turn), Some(ACCEPTED));
+    // All of them fall silent.
+    rig.world.run_for(15 * SECOND);
+    rig.world.forget();
+    introduce(&mut rig, 174);
+    rig.speak_for(2 * SECOND, &[(rig.gimbals, MavId::new(1, 174))]);
+
+    let expected = [(191, "1/154"), (192, "1/174"), (193, "1/172"), (194, "1/173")];
+    assert_eq!(rig.managed(), expected.map(|(manager, device)| (manager, device.to_owned())));
+    let told: Vec<Setpoint> = rig.world.take_messages(rig.gimbals);
+    let zeros: Vec<_> = told.iter().filter(|told| told.target_component == 174).collect();
+    assert!(!zeros.is_empty() && zeros.len() == told.len(), "{told:?}");
+    assert_eq!([zeros[0].angular_velocity_y, zeros[0].angular_velocity_z], [0.0, 0.0], "it is told to stop");
+    assert_eq!(rig.world.stored_turning.first().map(String::as_str), Some("gimbal-154\t1/154"));
 }
 
 /// "Then one POWEROFF heartbeat" of each manager that there was: one that waits for a gimbal that never came never beat, and
