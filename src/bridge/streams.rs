@@ -265,3 +265,25 @@ impl Wanted {
         self.spacing.is_some_and(|spacing| spacing > interval * 3 / 2)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `REQUEST_DATA_STREAM.req_message_rate`: "The requested message rate" in whole messages per second. A group is asked for
+    /// about as often as its message is needed, and once a second at least: at a rate of 0 it would end.
+    #[test]
+    fn a_group_is_asked_for_about_as_often_as_its_message_is_needed() {
+        for (interval_ms, rate_hz) in [(20, 50), (61, 16), (100, 10), (500, 2), (1_000, 1), (3_000, 1)] {
+            let mut streams = AutopilotStreams::default();
+            streams.handle_autopilot_found(Timestamp::ZERO);
+            streams.set_need(message::ATTITUDE, Need::AtLeast(Duration::from_millis(interval_ms)));
+            let refused = CommandOutcome::Answered(CommandResult::Unsupported as u8);
+            streams.handle_outcome(message::ATTITUDE, refused);
+
+            let asked = streams.take_due(Timestamp::from_secs(2));
+
+            assert_eq!(asked, Some(Ask::DataStream { group: mav_data_stream::EXTRA1, rate_hz }), "{interval_ms} ms");
+        }
+    }
+}

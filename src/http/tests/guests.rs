@@ -21,20 +21,28 @@ fn connections_that_ask_for_nothing_make_room() {
     assert_eq!(Answer::read(second).body, "ok", "there was room for two");
 }
 
-/// Whoever has asked gets the answer, and whoever comes waits for that.
+/// Whoever has asked gets the answer, and whoever comes waits for that; who asks by a body has asked when it is whole.
 #[test]
 fn connections_that_are_answered_are_not_cut() {
+    let token: Token = "0123456789abcdef".parse().expect("a token");
     let limits = Limits { connections: 1, ..Limits::default() };
-    // It hangs, so that the answer takes a second.
-    let window = Window::open(None, limits);
-    let mut first = window.connect();
-    first.write_all(HEALTHZ).expect("the kernel takes the request");
-    let mut second = window.connect();
-    second.write_all(b"GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n").expect("the kernel takes it");
+    // It hangs, so that the answer takes a second or two.
+    let window = Window::controlled(None, Some(token), Ok(()), limits);
+    let order = b"POST /api/v1/gimbals/camera/stop HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\
+        Authorization: Bearer 0123456789abcdef\r\nContent-Type: application/json\r\nContent-Length: 2\r\n\r\n{}";
+    for (request, error) in
+        [(HEALTHZ, "the core did not answer within 1 s"), (&order[..], "the core did not answer in time")]
+    {
+        let mut first = window.connect();
+        first.write_all(request).expect("the kernel takes the request");
+        let mut second = window.connect();
+        second
+            .write_all(b"GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
+            .expect("the kernel takes it");
 
-    let error = json!({"error": "the core did not answer within 1 s"});
-    assert_eq!(Answer::read(first).json(), error);
-    assert_eq!(Answer::read(second).status, 200);
+        assert_eq!(Answer::read(first).json(), json!({"error": error}));
+        assert_eq!(Answer::read(second).status, 200);
+    }
 }
 
 /// Who asks on and on without reading, or sends a body by halves, keeps nobody out.

@@ -21,7 +21,7 @@ use super::{
     with_gimbal_that,
 };
 use crate::support::script::{
-    ACCEPTED, DENIED, NAN, configure, device_status, ground_heartbeat, pitch_yaw_deg, pitchyaw, take_control,
+    ACCEPTED, DENIED, NAN, again, configure, device_status, ground_heartbeat, pitch_yaw_deg, pitchyaw, take_control,
     usual_capabilities,
 };
 use crate::support::world::{GCS, GIMBAL, MANAGER, World, three_links};
@@ -365,6 +365,35 @@ fn an_operation_that_is_not_done_changes_nothing() {
     let told = setpoints(&mut world, places);
     assert_eq!(told.len(), 20);
     assert!(told.iter().all(|(_, setpoint)| setpoint.q == before.q && setpoint.flags == before.flags));
+}
+
+/// "A repeat of the one that was accepted last is accepted again and not carried out again": after something that was asked
+/// over HTTP and moves the camera, now or by a setting, a command is no repeat, whatever its `confirmation`. What is only
+/// read, or was refused, changes nothing.
+#[test]
+fn after_what_http_asked_a_command_is_no_repeat() {
+    let parameter = Operation::SetParameter { name: "PITCH_OFFSET".to_owned(), value: 1.0 };
+    let place = Asked::LookAt { latitude_deg: 47.5, longitude_deg: 8.5, altitude_m: 400.0, datum: Datum::MeanSeaLevel };
+    for (asked, is_carried_out) in [
+        (down_to_the_right(), true),
+        (Asked::Operation(parameter), true),
+        (Asked::Operation(Operation::RefreshParameters), false),
+        // Nobody knows where the vehicle is.
+        (place, false),
+    ] {
+        let (mut world, places) = with_gimbal();
+        look(&mut world, places, 0.0, 0.0);
+        let command = pitchyaw(-10.0, 40.0, NAN, NAN, 44.0);
+        assert_eq!(world.result_of(places.ground, GCS, &command), Some(ACCEPTED));
+        world.ask_by_name(NAME, &asked);
+        world.forget();
+
+        assert_eq!(world.result_of(places.ground, GCS, &again(1, command)), Some(ACCEPTED));
+
+        let told: Vec<_> = setpoints(&mut world, places).iter().map(|(_, told)| pitch_yaw_deg(told.q)).collect();
+        let told: Vec<_> = told.iter().map(|(pitch, yaw)| (pitch.round(), yaw.round())).collect();
+        assert_eq!(told, vec![(-10.0, 40.0); usize::from(is_carried_out)], "{asked:?}");
+    }
 }
 
 /// A gimbal that is lost, that was never heard, or that nobody has heard of: each is answered at once.

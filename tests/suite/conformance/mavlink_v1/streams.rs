@@ -86,13 +86,31 @@ fn statement_45_only_what_was_asked_for_passes_to_the_gimbal() {
     assert!(!passes(&mut world, MavId::new(1, 2), &attitude(now)), "not of another component");
     assert!(!passes(&mut world, AUTOPILOT, &global_position(now, [47.0, 8.0, 500.0], 10.0)), "not asked for");
     assert!(passes(&mut world, AUTOPILOT, &attitude(now)));
-    // What a client asks does not open it.
-    let (mut world, places) = with_gimbal(v1_gimbal());
-    turn_vehicle(&mut world, places, 0.0);
-    world.send_bytes(places.ground, &GOLDEN);
-    world.forget();
-    let bytes = world.send(places.autopilot, AUTOPILOT, &attitude(world.now));
-    assert!(world.take(places.gimbal).iter().all(|arrival| arrival.bytes != bytes));
+    // What a client asks does not open it, nor what it asks itself of another than the autopilot.
+    for (asker, [target_system, target_component], opens) in [
+        (GCS, [1, 1], false),
+        (GIMBAL, [1, 2], false),
+        (GIMBAL, [2, 1], false),
+        (GIMBAL, [1, 0], true),
+        (GIMBAL, [0, 0], true),
+    ] {
+        let (mut world, places) = with_gimbal(v1_gimbal());
+        turn_vehicle(&mut world, places, 0.0);
+        let (req_message_rate, req_stream_id) = (10, EXTRA1);
+        let request = REQUEST_DATA_STREAM_DATA {
+            req_message_rate,
+            target_system,
+            target_component,
+            req_stream_id,
+            start_stop: 1,
+        };
+        let from = if asker == GCS { places.ground } else { places.gimbal };
+        world.send(from, asker, &MavMessage::REQUEST_DATA_STREAM(request));
+        world.forget();
+        let bytes = world.send(places.autopilot, AUTOPILOT, &attitude(world.now));
+        let passed = world.take(places.gimbal).iter().any(|arrival| arrival.bytes == bytes);
+        assert_eq!(passed, opens, "{asker} asks {target_system}/{target_component}");
+    }
 }
 
 /// An autopilot that does not know the request (PX4) is asked in the gimbal's place, for what comes too slowly; what a ground
