@@ -145,6 +145,7 @@ impl AutopilotStreams {
                 wanted.refused |= REFUSALS.contains(&result);
                 wanted.tries = wanted.tries.saturating_add(1);
             }
+            CommandOutcome::GivenUp => {}
             CommandOutcome::Unanswered => wanted.tries = wanted.tries.saturating_add(transactions::TRIES),
         }
         if wanted.group().is_some() {

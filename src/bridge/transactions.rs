@@ -150,15 +150,15 @@ impl Transactions {
     }
 
     /// Forgets every command: the system that sent them is ours no more. Drivers, which wait for what became of theirs, are
-    /// told that there was no answer; nobody else is told.
+    /// told that it is given up; nobody else is told.
     pub fn clear(&mut self) {
         let is_of_driver = |order: &Order| order.asker == Asker::Driver;
         self.outputs
             .retain(|output| matches!(output, TransactionOutput::Finished { order, .. } if is_of_driver(order)));
         let lanes = self.lanes.drain(..);
         let orders = lanes.flat_map(|lane| lane.sent.map(|sent| sent.order).into_iter().chain(lane.waiting));
-        let unanswered = |order| TransactionOutput::Finished { order, outcome: CommandOutcome::Unanswered };
-        self.outputs.extend(orders.filter(is_of_driver).map(unanswered));
+        let given_up = |order| TransactionOutput::Finished { order, outcome: CommandOutcome::GivenUp };
+        self.outputs.extend(orders.filter(is_of_driver).map(given_up));
     }
 
     pub fn handle_timeout(&mut self, now: Timestamp) {

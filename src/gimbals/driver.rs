@@ -97,4 +97,6 @@ pub enum CommandOutcome {
     Answered(u8),
     /// It was sent as often as a command is sent.
     Unanswered,
+    /// It was given no time to answer: the system id to which it would has changed.
+    GivenUp,
 }

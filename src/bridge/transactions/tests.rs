@@ -174,8 +174,8 @@ fn drivers_are_told_of_commands_that_are_forgotten() {
 
     transactions.clear();
 
-    let unanswered = |order| TransactionOutput::Finished { order, outcome: CommandOutcome::Unanswered };
-    assert_eq!(drain(&mut transactions), [unanswered(of_driver(285)), unanswered(of_driver(265))]);
+    let given_up = |order| TransactionOutput::Finished { order, outcome: CommandOutcome::GivenUp };
+    assert_eq!(drain(&mut transactions), [given_up(of_driver(285)), given_up(of_driver(265))]);
     assert_eq!(transactions.poll_timeout(), None);
 }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use super::operations::shown_mode;
-use super::{Generation, GremsyDriver, streams};
+use super::{Generation, GremsyDriver};
 use crate::geometry::{Angle, AngularRate};
 use crate::gimbals::details::{AxisDetails, EncoderDetails, GimbalDetails, ImuDetails, StreamDetails};
 use crate::gimbals::gremsy::modes::ControlMode;
@@ -138,7 +138,7 @@ impl GremsyDriver {
         for (stream, details) in &mut all {
             details.measured_hz = self.streams.measured(now, *stream);
         }
-        all.into_iter().map(|(stream, details)| (streams::name(stream).to_owned(), details)).collect()
+        all.into_iter().map(|(stream, details)| (stream.name().to_owned(), details)).collect()
     }
 
     fn ages(&self, now: Timestamp) -> BTreeMap<String, u64> {

@@ -237,9 +237,17 @@ impl Mount {
         self.leaves_unanswered() && now.since(self.unanswered_since) >= UNANSWERED_FOR
     }
 
-    /// It was told where to look, and does not leave what it is told unanswered.
-    pub fn has_heard(&self) -> bool {
-        self.sent.is_some_and(|(_, sent)| self.wanted == Some(sent)) && !self.leaves_unanswered()
+    /// It is told where to look, and does not leave what it is told unanswered. A target that changes all the time is told as
+    /// often as anything is.
+    pub fn has_heard(&self, now: Timestamp) -> bool {
+        let is_told = match (self.sent, self.wanted) {
+            (Some((_, sent)), Some(wanted)) if sent == wanted => true,
+            (Some((at, Order::Point { mode: sent, .. })), Some(Order::Point { mode: wanted, .. })) => {
+                sent == wanted && now.since(at) <= REPEAT_MOVING
+            }
+            _ => false,
+        };
+        is_told && !self.leaves_unanswered()
     }
 
     /// What became of a command of [`MountOutput::Command`]; false for one that is none of these.
@@ -256,21 +264,22 @@ impl Mount {
         };
         let is_done = outcome == CommandOutcome::Answered(CommandResult::Accepted as u8);
         let or_unanswered = |output: MountOutput| match outcome {
-            CommandOutcome::Unanswered => MountOutput::Unanswered,
-            CommandOutcome::Answered(_) => output,
+            CommandOutcome::Unanswered => Some(MountOutput::Unanswered),
+            CommandOutcome::GivenUp => None,
+            CommandOutcome::Answered(_) => Some(output),
         };
         if let Mode::Asked(mode) = self.mode
             && is(&mode_command(device, mode))
         {
-            let output = if is_done { MountOutput::ModeTaken } else { or_unanswered(MountOutput::ModeRefused) };
+            let output = if is_done { Some(MountOutput::ModeTaken) } else { or_unanswered(MountOutput::ModeRefused) };
             self.mode = if is_done { Mode::Is(mode) } else { Mode::Refused(mode, now) };
-            self.outputs.push_back(output);
+            self.outputs.extend(output);
             return true;
         }
         if matches!(self.retraction, Retraction::Returning { .. }) && is(&packet::set_motors(device, true)) {
             if !is_done {
                 self.retraction = Retraction::Off;
-                self.outputs.push_back(or_unanswered(MountOutput::StaysRetracted));
+                self.outputs.extend(or_unanswered(MountOutput::StaysRetracted));
             }
             return true;
         }

@@ -443,7 +443,7 @@ fn of_outcome(outcome: CommandOutcome) -> OperationResult {
         CommandOutcome::Answered(DENIED) => Err(OperationError::Denied),
         CommandOutcome::Answered(UNSUPPORTED) => Err(OperationError::UnsupportedByDevice),
         CommandOutcome::Answered(_) => Err(OperationError::Failed),
-        CommandOutcome::Unanswered => Err(OperationError::NoAnswer),
+        CommandOutcome::Unanswered | CommandOutcome::GivenUp => Err(OperationError::NoAnswer),
     }
 }
 

@@ -5,7 +5,7 @@ use super::faults::Fault;
 use super::mode_change::{self, ModeChange};
 use super::mount::{Condition, DEAD_MAN, MountOutput, Order};
 use super::operations::MOTORS_SHOW_WITHIN;
-use super::stopping::Stopping;
+use super::stopping::{LOOKS_AGAIN_WITHIN, Stopping};
 use super::told_rates::ToldRates;
 use super::{Generation, GremsyDriver, HandOver, Timer};
 use crate::geometry::{Angle, AngularRate, GimbalAngles, Yaw, YawFrame};
@@ -187,12 +187,22 @@ impl GremsyDriver {
         self.heard.attitude.map(|(at, _)| at)
     }
 
+    /// In v2, without its motors it stands, and zeros are a mode of their own, which it may take for switching them on.
+    fn is_switched_off(&self, now: Timestamp) -> bool {
+        let shows_it = |(at, status): (Timestamp, GimbalStatus)| {
+            now.since(at) <= LOOKS_AGAIN_WITHIN && status.flags.contains(GimbalFlags::RETRACT)
+        };
+        self.mode_change.is_some_and(|change| change.mode() == ControlMode::Off)
+            || self.heard.attitude.is_some_and(shows_it)
+    }
+
     fn stop_on_in_v2(&mut self, now: Timestamp, device: MavId) {
+        let is_off = self.is_switched_off(now);
         if let Some(stopping) = &mut self.stopping {
             if stopping.is_over(now) {
                 self.stopping = None;
                 self.told_rates = ToldRates::default();
-            } else if let Some(zero) = stopping.handle_timeout(now, self.is_alive) {
+            } else if let Some(zero) = stopping.handle_timeout(now, self.is_alive).filter(|_| !is_off) {
                 self.v2.handle_setpoint(now, zero);
             }
             self.drain_v2(now, device);
@@ -305,6 +315,7 @@ impl GremsyDriver {
     /// Something else than its setpoint was asked of it.
     pub(super) fn drop_demand(&mut self, now: Timestamp, device: MavId) {
         self.effect.handle_target(None);
+        self.hand_over = HandOver::No;
         self.stop_v2(now);
         self.hand_over_waits = false;
         self.mount.drop_order(now, device, self.condition());

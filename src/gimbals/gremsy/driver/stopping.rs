@@ -19,7 +19,7 @@ const REPLACED_FOR: Duration = Duration::from_secs(1);
 
 /// One that told where it looks not longer ago tells it again, and two looks so far apart are not compared: meanwhile it may
 /// have turned round.
-const LOOKS_AGAIN_WITHIN: Duration = Duration::from_secs(3);
+pub const LOOKS_AGAIN_WITHIN: Duration = Duration::from_secs(3);
 
 /// One that rests does so from the nose or over ground, but for this.
 const RESTS_DPS: f64 = 0.5;

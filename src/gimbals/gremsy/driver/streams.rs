@@ -144,16 +144,6 @@ pub const fn stream_of(message_id: u32) -> Option<Stream> {
     }
 }
 
-/// As in the status.
-pub const fn name(stream: Stream) -> &'static str {
-    match stream {
-        Stream::Encoders => "encoders",
-        Stream::MountOrientation => "mount_orientation",
-        Stream::AttitudeStatus => "attitude_status",
-        Stream::RawImu => "raw_imu",
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

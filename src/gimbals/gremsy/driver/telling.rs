@@ -77,7 +77,13 @@ impl GremsyDriver {
             let step = change.handle_flags(status.flags);
             self.handle_mode_step(now, device, step);
         }
-        let status = GimbalStatus { failures: status.failures | self.failures(), ..status };
+        // Nothing says that it tells that itself.
+        let mut flags = status.flags;
+        flags.set(
+            GimbalFlags::RC_EXCLUSIVE,
+            flags.contains(GimbalFlags::RC_EXCLUSIVE) || self.hand_over == HandOver::Done,
+        );
+        let status = GimbalStatus { flags, failures: status.failures | self.failures(), ..status };
         let is_wrong = self.version().is_some_and(|version| version.has_wrong_earth_yaw());
         let status = if is_wrong { self.without_earth_yaw(now, status) } else { status };
         self.tell_attitude(now, status);
@@ -114,7 +120,7 @@ impl GremsyDriver {
         let limits = FailureFlags::AT_PITCH_LIMIT | FailureFlags::AT_YAW_LIMIT | FailureFlags::AT_ROLL_LIMIT;
         let motors_off = self.heard.status.is_some_and(|(_, status)| !status.motors_on());
         // What it does not acknowledge it need not do.
-        let is_unheard = matches!(self.mount.wanted(), Some(Order::Point { .. })) && !self.mount.has_heard();
+        let is_unheard = matches!(self.mount.wanted(), Some(Order::Point { .. })) && !self.mount.has_heard(now);
         if motors_off || is_unheard {
             return self.effect.pause();
         }

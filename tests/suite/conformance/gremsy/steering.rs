@@ -340,8 +340,8 @@ fn a_gimbal_that_was_handed_to_its_radio_control_is_told_nothing() {
     assert!(is_handed_over(&world), "{:?}", seen(&world).flags);
 }
 
-/// "DENIED, as its 283 tells of no RC inputs; by name (`radio-control`) 204 with mode 3 …, and no flag shows it, as 285 is its own"
-/// (`docs/families/gremsy.md`).
+/// "DENIED, as its 283 tells of no RC inputs; by name (`radio-control`) 204 with mode 3 …; when it has acknowledged that, the flag is
+/// in 281, as 285 is its own" (`docs/families/gremsy.md`).
 #[test]
 fn a_gimbal_of_v2_is_handed_to_its_radio_control_by_name_only() {
     let (mut world, places) = running(Generation::V2);
@@ -354,7 +354,28 @@ fn a_gimbal_of_v2_is_handed_to_its_radio_control_by_name_only() {
     assert_eq!(operate(&mut world, places, Operation::RadioControl), Some(Ok(())));
     run(&mut world, places, SECOND);
     assert_eq!(orders(&mut world, places), (vec![packet::hand_to_rc(GIMBAL)], vec![]));
-    assert!(!is_handed_over(&world), "{:?}", seen(&world).flags);
+    assert!(is_handed_over(&world), "{:?}", seen(&world).flags);
+}
+
+/// A v2 gimbal tells of no radio control itself, so that it is shown what it has acknowledged; and whatever else is asked of it
+/// takes it back in either generation, to be steered on.
+#[test]
+fn one_that_was_left_to_its_radio_control_by_name_is_shown_so_until_something_else_is_asked() {
+    use gimbald::gimbals::operation::YawMode;
+    for generation in [Generation::V1, Generation::V2] {
+        let (mut world, places) = running(generation);
+        take_control(&mut world);
+        assert_eq!(operate(&mut world, places, Operation::RadioControl), Some(Ok(())), "{generation:?}");
+        assert!(is_handed_over(&world), "{generation:?} {:?}", seen(&world).flags);
+        world.forget();
+        run(&mut world, places, 3 * SECOND);
+        assert_eq!((orders(&mut world, places), seen(&world).setpoint), ((vec![], vec![]), None), "{generation:?}");
+        assert_eq!(operate(&mut world, places, Operation::SetYawMode(YawMode::Follow)), Some(Ok(())), "{generation:?}");
+        assert!(!is_handed_over(&world), "{generation:?} {:?}", seen(&world).flags);
+        point(&mut world, -20.0, 10.0);
+        run(&mut world, places, 5 * SECOND);
+        assert_looks(&world, -20.0, 10.0);
+    }
 }
 
 fn is_handed_over(world: &World) -> bool {

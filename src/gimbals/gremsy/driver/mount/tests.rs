@@ -308,3 +308,20 @@ fn orders_that_are_never_answered_are_noticed() {
     mount.handle_answer(true);
     assert!(!mount.is_unanswered(at(3_000)));
 }
+
+/// A change of our system id gives up what is on its way: that is no gimbal that does not answer. It is asked again.
+#[test]
+fn what_is_given_up_is_not_unanswered() {
+    for (outcome, told) in
+        [(CommandOutcome::GivenUp, vec![]), (CommandOutcome::Unanswered, vec![MountOutput::Unanswered])]
+    {
+        let mut mount = Mount::default();
+        mount.order(at(0), point(-10.0, 0.0, YawMode::Follow));
+        mount.advance(at(0), GIMBAL, READY);
+        assert_eq!(drain(&mut mount), [MountOutput::Command(packet::follow(GIMBAL))]);
+        assert!(mount.handle_outcome(at(10), GIMBAL, &packet::follow(GIMBAL), outcome));
+        assert_eq!(drain(&mut mount), told, "{outcome:?}");
+        let again = stream(&mut mount, 10, 3_000, point(-10.0, 0.0, YawMode::Follow), READY);
+        assert_eq!(again, [(2_010, MountOutput::Command(packet::follow(GIMBAL)))], "{outcome:?}");
+    }
+}

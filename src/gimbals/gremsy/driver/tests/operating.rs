@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::gimbals::driver::CommandOutcome;
-use crate::gimbals::operation::{Operation, OperationError, OperationId, OperationResult, YawMode};
-use crate::wire::dialect::{COMMAND_LONG_DATA, MOUNT_ORIENTATION_DATA};
+use crate::gimbals::operation::{Motors, Operation, OperationError, OperationId, OperationResult, YawMode};
+use crate::wire::dialect::{COMMAND_LONG_DATA, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, MOUNT_ORIENTATION_DATA};
 
 const ID: OperationId = OperationId(7);
 
@@ -17,7 +17,7 @@ fn running(seconds: u64) -> GremsyDriver {
     driver
 }
 
-/// What came of it since, and the commands.
+/// What came of it since, and the commands; nothing else is told it.
 fn outcome(driver: &mut GremsyDriver) -> (Vec<OperationResult>, Vec<COMMAND_LONG_DATA>) {
     let (mut results, mut commands) = (Vec::new(), Vec::new());
     while let Some(output) = driver.poll_output() {
@@ -27,7 +27,8 @@ fn outcome(driver: &mut GremsyDriver) -> (Vec<OperationResult>, Vec<COMMAND_LONG
                 results.push(result);
             }
             DriverOutput::Command(command) => commands.push(*command),
-            DriverOutput::Message(_) | DriverOutput::Report(_) => {}
+            DriverOutput::Message(message) => panic!("{message:?}"),
+            DriverOutput::Report(_) => {}
         }
     }
     (results, commands)
@@ -45,9 +46,41 @@ fn a_mode_is_taken_when_the_status_shows_it() {
     let now = Timestamp::from_millis(15_100);
     driver.handle_command_outcome(now, &commands[0], CommandOutcome::Answered(0));
     hear(&mut driver, now, &status(0));
-    assert_eq!(outcome(&mut driver).0, [], "it follows");
+    assert_eq!(outcome(&mut driver), (vec![], vec![]), "it follows");
     hear(&mut driver, now, &SYS_STATUS_DATA { errors_count1: 0x0010, ..status(0) });
-    assert_eq!(outcome(&mut driver).0, [Ok(())]);
+    assert_eq!(outcome(&mut driver), (vec![Ok(())], vec![]));
+}
+
+/// "RETRACT in v2 cuts motors": a camera that falls as it was told to turn is told no zeros, which are a mode of their own, from
+/// then on; nor is one that turned on until then, on a vehicle that turns.
+#[test]
+fn no_zeros_are_said_to_one_that_is_being_switched_off() {
+    let mut driver =
+        GremsyDriver::new(GremsySettings { generation: Some(Generation::V2), ..GremsySettings::default() });
+    driver.adopt(Timestamp::ZERO, GIMBAL);
+    run(&mut driver, 0, 15_000);
+    let turning = Turning { yaw: AngularRate::from_degrees_per_second(20.0), ..Turning::STOPPED };
+    driver.handle_setpoint(Timestamp::from_secs(15), Setpoint::Turn(turning));
+    driver.handle_operation(Timestamp::from_secs(15), ID, Operation::Motors(Motors::Off));
+    let mut sent = Vec::new();
+    for millis in (15_000..22_000_u32).step_by(50) {
+        let now = Timestamp::from_millis(millis.into());
+        let half = 0.01_f32.to_radians() * (millis - 15_000) as f32;
+        let retracted = if millis >= 18_300 { GimbalFlags::RETRACT } else { GimbalFlags::empty() };
+        let status = GIMBAL_DEVICE_ATTITUDE_STATUS_DATA {
+            time_boot_ms: millis,
+            q: [half.cos(), 0.0, 0.0, half.sin()],
+            flags: (GimbalFlags::ROLL_LOCK | GimbalFlags::PITCH_LOCK | retracted).bits(),
+            ..GIMBAL_DEVICE_ATTITUDE_STATUS_DATA::DEFAULT
+        };
+        hear(&mut driver, now, &status);
+        driver.handle_timeout(now);
+        let retracts = |flags| GimbalFlags::from_bits_retain(flags).contains(GimbalFlags::RETRACT);
+        sent.extend(setpoints(&mut driver).into_iter().map(|sent| (millis, retracts(sent.flags))));
+    }
+    let expected = [(15_000, false)].into_iter().chain((15_000..=18_000).step_by(100).map(|at| (at, false)));
+    let expected = expected.chain((18_000..18_300).step_by(100).map(|at| (at, true)));
+    assert_eq!(sent, expected.collect::<Vec<_>>(), "the rate, zeros, and the word for its motors");
 }
 
 /// A gimbal that is told to start again, does not answer and falls silent has done it; one that goes on telling where it looks
@@ -64,6 +97,6 @@ fn a_restart_without_an_answer_is_done_by_a_gimbal_that_falls_silent() {
             MOUNT_ORIENTATION_DATA { time_boot_ms: last_heard_ms, roll: 0.0, pitch: 0.0, yaw: 0.0, yaw_absolute: 0.0 };
         hear(&mut driver, Timestamp::from_millis(last_heard_ms.into()), &orientation);
         driver.handle_command_outcome(Timestamp::from_secs(16), &commands[0], CommandOutcome::Unanswered);
-        assert_eq!(outcome(&mut driver).0, [expected], "last heard at {last_heard_ms}");
+        assert_eq!(outcome(&mut driver), (vec![expected], vec![]), "last heard at {last_heard_ms}");
     }
 }

@@ -1,7 +1,9 @@
 //! What the driver makes of what a Gremsy tells.
 
 use super::*;
+use crate::geometry::Yaw;
 use crate::gimbals::report::GimbalAttitude;
+use crate::gimbals::setpoint::Pointing;
 use crate::wire::dialect::{MOUNT_ORIENTATION_DATA, MOUNT_STATUS_DATA, PARAM_VALUE_DATA, RAW_IMU_DATA};
 
 fn driver(generation: Generation) -> GremsyDriver {
@@ -154,6 +156,50 @@ fn statement_19_a_yaw_from_north_is_told_where_there_is_a_true_one() {
         assert_eq!(told.flags.contains(GimbalFlags::YAW_IN_EARTH_FRAME), is_from_north);
         assert!((told.attitude.yaw().angle().degrees() - f64::from(expected)).abs() < 1e-4, "{told:?}");
     }
+}
+
+/// "if the commanded pose differs by > 10° from the report for > 3 s" (gimbals 1.10), also where it is commanded more often than
+/// anything is sent and a little otherwise each time, as ArduPilot and a joystick do.
+#[test]
+fn one_that_does_not_move_is_recognised_while_its_target_changes_all_the_time() {
+    let mut driver = driver(Generation::V1);
+    run(&mut driver, 0, 12_000);
+    let accepted = CommandOutcome::Answered(CommandResult::Accepted as u8);
+    let ack = COMMAND_ACK_DATA {
+        command: command::DO_MOUNT_CONTROL,
+        result: CommandResult::Accepted as u8,
+        progress: 0,
+        result_param2: 0,
+        target_system: 1,
+        target_component: 191,
+    };
+    let recognised = (12_000..20_000).step_by(10).find(|millis| {
+        let now = Timestamp::from_millis(*millis);
+        if millis.is_multiple_of(20) {
+            driver.handle_setpoint(
+                now,
+                Setpoint::Point(Pointing {
+                    roll: Angle::ZERO,
+                    pitch: Angle::from_degrees(-60.0 + 1e-6 * *millis as f64),
+                    yaw: Yaw::InVehicleFrame(Angle::ZERO),
+                    stabilised: Stabilised::BOTH,
+                    radio_control: RadioControl::Off,
+                }),
+            );
+            driver.handle_command_outcome(now, &packet::follow(GIMBAL), accepted);
+        }
+        if millis.is_multiple_of(50) {
+            hear(&mut driver, now, &ack);
+            tell_orientation(&mut driver, *millis, 0.0, 0.0);
+        }
+        driver.handle_timeout(now);
+        faults(&driver).iter().any(|fault| fault.contains("does not move"))
+    });
+    assert!(
+        recognised.is_some_and(|millis| (15_000..15_300).contains(&millis)),
+        "{recognised:?} {:?}",
+        faults(&driver)
+    );
 }
 
 /// A gimbal without a yaw from North turns, and not the vehicle below it.
