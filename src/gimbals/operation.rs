@@ -268,7 +268,10 @@ pub enum OperationError {
     #[error("the gimbal may still be turning, and is being stopped; ask again when it stands")]
     StillTurning,
     /// It was asked for parameters and has told none at all.
-    #[error("the gimbal tells no parameters: it has none, or does not hear that it is asked for them")]
+    #[error(
+        "the gimbal tells no parameters: it has none, as many that speak v1, or does not hear that it is asked for them; check \
+         the line towards it"
+    )]
     NoParameters,
     /// Answered, and yet it is not so.
     #[error("the gimbal answered, but did not do it: {0}")]

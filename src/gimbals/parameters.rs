@@ -288,7 +288,7 @@ impl Parameters {
     /// The device was restarted: what is known is of before, and what was asked for is not done.
     pub fn handle_restart(&mut self) {
         let device = self.device;
-        self.forget();
+        self.abandon(&OperationError::NotReady);
         self.device = device;
     }
 

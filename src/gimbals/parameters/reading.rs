@@ -117,7 +117,9 @@ impl Parameters {
         match missing {
             0 => Ok(()),
             missing => {
-                let text = format!("{missing} of its {count} parameters did not come in time");
+                let text = format!(
+                    "{missing} of its {count} parameters did not come in time; ask again, and check the line to it"
+                );
                 Err(OperationError::NoEffect(text))
             }
         }

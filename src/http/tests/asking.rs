@@ -306,7 +306,8 @@ fn what_is_not_done_has_its_status_and_its_reason() {
             NotDone::Operation(OperationError::NoParameters),
             504,
             json!({
-                "error": "the gimbal tells no parameters: it has none, or does not hear that it is asked for them",
+                "error": "the gimbal tells no parameters: it has none, as many that speak v1, or does not hear that it is asked \
+                          for them; check the line towards it",
                 "reason": "no_parameters",
             }),
         ),

@@ -288,7 +288,7 @@ fn a_strange_list_is_read_as_far_as_it_goes() {
     assert_eq!(line.parameters.values().collect::<Vec<_>>(), [("RC_REVERSE_AXISX", 1.0), ("TWICE", 5.0)]);
     let read: Vec<i16> = line.reads().iter().map(|(_, _, place)| *place).collect();
     assert!(read.len() < 140 && read.iter().all(|place| (4..512).contains(place)), "{read:?}");
-    let text = "508 of its 512 parameters did not come in time".to_owned();
+    let text = "508 of its 512 parameters did not come in time; ask again, and check the line to it".to_owned();
     let last = line.done.last().cloned();
     assert_eq!(last, Some(done(14_000, ID, Err(OperationError::NoEffect(text)))));
 }
@@ -308,19 +308,24 @@ fn a_flood_fills_no_memory_and_holds_nothing_up() {
 }
 
 /// A gimbal that was restarted or lost may have other ones, or be another: nothing is known of it, and what was asked for is
-/// not done.
+/// not done. One that was restarted is there.
 #[test]
 fn nothing_is_known_of_a_gimbal_that_was_away() {
-    let mut line = mixed(IntegerEncoding::CCast);
-    line.parameters.set(line.now, ID, &[("COUNT", 171.0)]);
-    line.parameters.refresh_for(line.now, ID_8);
-    line.run_for(100);
-    line.parameters.forget();
-    line.parameters.listen(GIMBAL);
-    line.run_for(10_000);
+    for (is_restarted, error) in [(false, OperationError::NotThere), (true, OperationError::NotReady)] {
+        let mut line = mixed(IntegerEncoding::CCast);
+        line.parameters.set(line.now, ID, &[("COUNT", 171.0)]);
+        line.parameters.refresh_for(line.now, ID_8);
+        line.run_for(100);
+        if is_restarted {
+            line.parameters.handle_restart();
+        } else {
+            line.parameters.forget();
+        }
+        line.parameters.listen(GIMBAL);
+        line.run_for(10_000);
 
-    let gone = Err(OperationError::NotThere);
-    assert_eq!(results(&line), [(ID, gone.clone()), (ID_8, gone)]);
-    assert_eq!((line.sets(), line.parameters.values().count()), (vec![], 0));
-    assert_eq!(line.gimbal.value("COUNT"), Some(ParameterValue::Integer(154)));
+        assert_eq!(results(&line), [(ID, Err(error.clone())), (ID_8, Err(error))]);
+        assert_eq!((line.sets(), line.parameters.values().count()), (vec![], 0));
+        assert_eq!(line.gimbal.value("COUNT"), Some(ParameterValue::Integer(154)));
+    }
 }

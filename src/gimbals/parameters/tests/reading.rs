@@ -214,7 +214,9 @@ fn a_refresh_reads_what_no_table_has() {
     let of_delta: Vec<i16> =
         line.reads().into_iter().filter(|(_, name, _)| name == "DELTA").map(|(_, _, index)| index).collect();
     assert_eq!(of_delta, [-1; 5]);
-    let result = Err(OperationError::NoEffect("1 of its 4 parameters did not come in time".to_owned()));
+    let result = Err(OperationError::NoEffect(
+        "1 of its 4 parameters did not come in time; ask again, and check the line to it".to_owned(),
+    ));
     assert_eq!(line.done.last().map(|(_, done)| done), Some(&ParameterOutput::Done { id: ID, result }));
 }
 
