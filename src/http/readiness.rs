@@ -62,11 +62,17 @@ mod tests {
         snapshot.links.push(link("ground", "down", None));
         snapshot.gimbals.push(gimbal("lamp", "searching"));
         snapshot.gimbals.push(gimbal("radar", "lost"));
+        for (name, state) in [("winch", "lost"), ("mast", "alive")] {
+            let mut shut_down = gimbal(name, state);
+            shut_down.details.stage = Some("shut_down".to_owned());
+            snapshot.gimbals.push(shut_down);
+        }
         let reasons = vec![
             "link gimbal is down: no such device".to_owned(),
             "link ground is down".to_owned(),
             "gimbal lamp is searching".to_owned(),
             "gimbal radar is lost".to_owned(),
+            "gimbal winch is shut down".to_owned(),
         ];
         assert_eq!(Readiness::of(&snapshot), Readiness { ready: false, reasons });
     }

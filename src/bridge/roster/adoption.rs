@@ -272,3 +272,31 @@ impl Roster {
         now
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bridge::settings::Settings;
+    use crate::gimbals::setpoint::{Setpoint, Turning};
+    use crate::gimbals::settings::{Family, GimbalSettings};
+
+    /// One that its driver was still stopping when it took the vehicle's system id is stopped under that, whatever became of the
+    /// rotation meanwhile; one that stands is left alone.
+    #[test]
+    fn one_that_turns_is_stopped_under_the_id_that_it_takes() {
+        for turns in [true, false] {
+            let gimbal = GimbalSettings { family: Family::Gremsy, ..GimbalSettings::found("camera".to_owned()) };
+            let mut roster = Roster::new(&Settings { gimbals: vec![gimbal], ..Settings::default() });
+            let place = Place { link: 0, channel: ChannelId::new(0).expect("below the bound") };
+            let gimbal = roster.adopt(Timestamp::ZERO, MavId::new(42, 154), place, 1).expect("there is room");
+            if turns {
+                gimbal.driver.handle_setpoint(Timestamp::ZERO, Setpoint::Turn(Turning::STOPPED));
+            }
+            assert_eq!((gimbal.driver.may_be_turning(), gimbal.manager.may_be_turning()), (turns, false));
+
+            let gimbal = roster.adopt(Timestamp::from_secs(1), MavId::new(1, 154), place, 1).expect("it is the same");
+
+            assert_eq!((gimbal.adopted, gimbal.manager.may_be_turning()), (Some(MavId::new(1, 154)), turns));
+        }
+    }
+}

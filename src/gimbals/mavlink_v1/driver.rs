@@ -242,7 +242,10 @@ impl MavlinkV1Driver {
             // What comes in the meantime takes the place of what is wanted now.
             return;
         }
-        self.carry_assumed_on(now);
+        // As long as it says where it looks it is not guessed about.
+        if self.feedback == Feedback::OpenLoop {
+            self.carry_assumed_on(now);
+        }
         self.sent = Some((now, wanted));
         self.obedience.handle_target(match wanted {
             MountControl::Angles(angles) => Some([angles.pitch, angles.yaw]),

@@ -73,17 +73,28 @@ fn who_tells_where_it_looks_in_two_ways_is_believed_in_one() {
 fn statement_47_each_axis_is_guessed_slowly_until_it_is_told() {
     let mut line = Line::new(Signs::NORMAL, Reports::Nothing);
     line.run_for(4 * SECOND);
-    line.point(-60.0, 90.0);
+    let Setpoint::Point(ahead) = pointing(-60.0, 90.0) else { panic!("it is a direction") };
+    line.tell(Setpoint::Point(Pointing { roll: Angle::from_degrees(45.0), ..ahead }));
     line.run_for(SECOND);
-    assert_near(line.reported(), (-30.0, 30.0));
-    line.hear(&MOUNT_ORIENTATION_DATA { time_boot_ms: 9_000, roll: 0.0, pitch: 10.0, yaw: 20.0, yaw_absolute: 20.0 });
+    assert_eq!(guesses(&line).last(), Some(&[30, -30, 30]));
+    line.hear(&MOUNT_ORIENTATION_DATA { time_boot_ms: 9_000, roll: 5.0, pitch: 10.0, yaw: 20.0, yaw_absolute: 20.0 });
     line.reports.clear();
     line.run_for(SECOND);
-    let guesses = line.reports.iter().filter(|(_, report)| matches!(report, Report::Attitude(_))).count();
-    assert_eq!(guesses, 0);
+    assert_eq!(guesses(&line), [[0; 3]; 0]);
     // Silent for two seconds, it is guessed about from where it was last.
-    line.run_for(SECOND * 11 / 10);
+    line.run_for(SECOND * 12 / 10);
     assert!(line.is_open_loop());
+    assert_eq!(guesses(&line), [[5, 10, 20], [8, 7, 23], [11, 4, 26]]);
+}
+
+/// Roll, pitch and yaw of every attitude that was reported, whole degrees.
+fn guesses(line: &Line) -> Vec<[i32; 3]> {
+    let degrees = |angle: Angle| angle.degrees().round() as i32;
+    let angles = line.reports.iter().filter_map(|(_, report)| match report {
+        Report::Attitude(status) => Some(status.attitude.angles()),
+        _ => None,
+    });
+    angles.map(|angles| [angles.roll, angles.pitch, angles.yaw].map(degrees)).collect()
 }
 
 /// "After gimbal HEARTBEAT loss > 5 s forget FOLLOW/LOCK state and re-send mode on return"; one that was restarted has
