@@ -1,5 +1,8 @@
 //! Regions of interest (protocol checklist 8.8).
 
+mod bearing;
+mod ending;
+
 use std::time::Duration;
 
 use gimbald::bridge::settings::Settings;
@@ -8,7 +11,6 @@ use gimbald::wire::MavId;
 use gimbald::wire::dialect::{ATTITUDE_DATA, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, MavMessage};
 use gimbald::wire::ids::CapFlags;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use proptest::prelude::*;
 
 use super::frames::turn_vehicle;
 use super::{
@@ -274,267 +276,6 @@ fn item_121_what_tells_the_heading_is_what_is_followed() {
     }
 }
 
-/// "When 197 arrives, ROI stops; if the primary streams 287, its set-point applies, else NEUTRAL."
-/// Protocol checklist 123: "When 195 with (0,0,0) arrives it acts like 197."
-/// Client checklist E117: "197 as COMMAND_INT and COMMAND_LONG, p1 = id, 0 or NaN, x/y = 0, INT32_MIN or INT32_MAX:
-/// ACCEPTED, tracking ends."
-#[test]
-fn items_122_and_123_a_region_of_interest_ends_in_neutral() {
-    let nan_as_integer = 0x7ff8_0000;
-    let ends = [
-        command_long(MANAGER, 197, &[154.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
-        command_long(MANAGER, 197, &[]),
-        command_long(MANAGER, 197, &[0.0, NAN, NAN, NAN, 47.0, f32::INFINITY, 300.0]),
-        in_frame(0, command_int(MANAGER, 197, [NAN; 4], 0, 0, NAN)),
-        in_frame(0, command_int(MANAGER, 197, [154.0, NAN, NAN, NAN], i32::MIN, i32::MIN, NAN)),
-        in_frame(10, command_int(MANAGER, 197, [0.0; 4], i32::MAX, i32::MAX, 0.0)),
-        command_int(MANAGER, 197, [0.0; 4], nan_as_integer, nan_as_integer, f32::INFINITY),
-        roi_location(0, [0.0, 0.0], 0.0),
-        roi_location(3, [0.0, 0.0], -0.0),
-        command_long(MANAGER, 195, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
-    ];
-    for end in ends {
-        for has_neutral in [true, false] {
-            let (mut world, places) = looking_at(BELOW, has_neutral);
-            assert_eq!(world.result_of(places.ground, GCS, &end), Some(ACCEPTED), "{end:?}");
-            let setpoint = only_setpoint(&mut world, places);
-            if has_neutral {
-                assert!(setpoint.flags == 2 | 44 && is_nan(&setpoint.q), "{setpoint:?}");
-            } else {
-                assert_eq!((setpoint.flags, setpoint.q), (44, [1.0, 0.0, 0.0, 0.0]));
-            }
-            assert_eq!(world.snapshot().gimbals[0].roi, None);
-        }
-    }
-    // The primary has gone on streaming, which ended the region of interest before.
-    let (mut world, places) = looking_at(BELOW, true);
-    world.send(places.ground, GCS, &set_pitchyaw(-0.2, 0.3, NAN, NAN, 44));
-    world.forget();
-    assert_eq!(world.result_of(places.ground, GCS, &command_long(MANAGER, 197, &[])), Some(ACCEPTED));
-    assert_eq!(setpoints(&mut world, places), []);
-    world.run_for(SECOND / 10);
-    let (_, setpoint) = setpoints(&mut world, places).pop().expect("it is streamed");
-    let (pitch, yaw) = pitch_yaw_deg(setpoint.q);
-    assert_near(pitch, (-0.2_f64).to_degrees(), 0.001);
-    assert_near(yaw, 0.3_f64.to_degrees(), 0.001);
-}
-
-/// "When 201 with MAV_ROI 0 arrives it acts like 197; with 3 like 195." To us and to everybody in our system.
-/// Protocol notes 2.6: "201: map MAV_ROI 0→197, 3→195, 4→198, 1→196, 2→UNSUPPORTED."
-#[test]
-fn item_126_the_command_of_old_ground_stations_is_taken_as_its_successors() {
-    let [latitude, longitude] = BELOW.map(|degrees| degrees as f32);
-    let integers = BELOW.map(|degrees| (degrees * 1e7).round() as i32);
-    for target in [MANAGER, MavId::new(1, 0)] {
-        let location = command_int(target, 201, [3.0, 0.0, 0.0, 0.0], integers[0], integers[1], 388.0);
-        for look in [
-            command_long(target, 201, &[3.0, 0.0, 0.0, 0.0, latitude, longitude, 388.0]),
-            in_frame(0, location.clone()),
-            in_frame(5, location),
-        ] {
-            let (mut world, places) = with_gimbal();
-            fly(&mut world, places, FIELD, 0.0);
-            assert_eq!(world.result_of(places.ground, GCS, &look), Some(ACCEPTED), "{look:?}");
-            let (pitch, yaw) = pitch_yaw_deg(only_setpoint(&mut world, places).q);
-            assert_near(pitch, -36.653, 0.05);
-            assert_near(yaw, 34.176, 0.05);
-            world.forget();
-            let none = command_long(target, 201, &[0.0; 7]);
-            assert_eq!(world.result_of(places.ground, GCS, &none), Some(ACCEPTED));
-            let setpoint = only_setpoint(&mut world, places);
-            assert!(setpoint.flags == 2 | 44 && is_nan(&setpoint.q), "{setpoint:?}");
-        }
-        // The rest is refused to who asked exactly us, and moves nothing.
-        let (mut world, places) = with_gimbal();
-        fly(&mut world, places, FIELD, 0.0);
-        world.forget();
-        for kind in [1.0, 2.0, 4.0, 5.0, NAN] {
-            let other = command_long(target, 201, &[kind, 1.0, 0.0, 0.0, latitude, longitude, 388.0]);
-            let answer = if target == MANAGER { Some(UNSUPPORTED) } else { None };
-            assert_eq!(world.result_of(places.ground, GCS, &other), answer, "{target} {kind}");
-        }
-        assert_eq!(setpoints(&mut world, places), []);
-        assert_eq!(world.snapshot().gimbals[0].primary, None);
-        let rejected = world.snapshot().gimbals[0].rejected.get("255/190").cloned().unwrap_or_default();
-        let counted = if target == MANAGER { Some(&5) } else { None };
-        assert_eq!(rejected.get("do_set_roi_unsupported"), counted, "{rejected:?}");
-    }
-}
-
-/// "When 287 from the primary arrives during ROI, ROI is cancelled." So do the others, and zero rates, which are how some
-/// clients say stop.
-/// Client checklist E119: "An accepted 1000 or 282 of the owner ends ROI."
-#[test]
-fn item_124_a_demand_ends_the_region_of_interest() {
-    for demand in [
-        set_pitchyaw(-0.2, 0.3, NAN, NAN, 44),
-        set_pitchyaw(NAN, NAN, 0.1, 0.1, 44),
-        set_pitchyaw(NAN, NAN, 0.0, 0.0, 44),
-        set_attitude(quaternion(-10.0, 20.0), [NAN; 3], 44),
-        set_attitude([NAN; 4], [NAN, 0.0, 0.0], 60),
-        set_manual_control(NAN, NAN, 0.5, NAN),
-        pitchyaw(-10.0, NAN, NAN, NAN, 44.0),
-        pitchyaw(NAN, NAN, NAN, NAN, 2.0),
-    ] {
-        let (mut world, places) = looking_at(BELOW, true);
-        world.send(places.ground, COMPANION, &demand);
-        assert!(world.snapshot().gimbals[0].roi.is_some(), "somebody else's is refused");
-        world.send(places.ground, GCS, &demand);
-        assert_eq!(world.snapshot().gimbals[0].roi, None, "{demand:?}");
-    }
-}
-
-/// "When 195 is addressed to S/154, it is forwarded to the device and not executed by us."
-#[test]
-fn item_127_a_place_for_the_device_is_the_devices_business() {
-    let (mut world, places) = with_gimbal();
-    fly(&mut world, places, FIELD, 0.0);
-    world.forget();
-    let sent = world.send(places.ground, GCS, &crate::support::script::to(GIMBAL, roi_location(0, BELOW, 388.0)));
-    let heard: Vec<Vec<u8>> = world.take(places.gimbal).into_iter().map(|arrival| arrival.bytes).collect();
-    assert_eq!(heard, [sent]);
-    assert_eq!(world.take(places.ground), []);
-    assert_eq!(world.snapshot().gimbals[0].roi, None);
-}
-
-/// "When the AP link is silent for 5 s, ROI and earth-frame conversion report stale, the gimbal keeps its last
-/// vehicle-frame set-point."
-#[test]
-fn item_178_when_the_vehicle_falls_silent_the_gimbal_keeps_its_last_direction() {
-    let to_north = pitchyaw(-10.0, 90.0, NAN, NAN, 92.0);
-    for command in [roi_location(0, BELOW, 388.0), to_north] {
-        let (mut world, places) = with_gimbal();
-        fly(&mut world, places, FIELD, 30.0);
-        assert_eq!(world.result_of(places.ground, GCS, &command), Some(ACCEPTED));
-        let last = only_setpoint(&mut world, places);
-        let is_stale = |world: &World| world.snapshot().gimbals[0].setpoint.clone().expect("a setpoint").stale;
-
-        run_looking(&mut world, places, SECOND, 0.0, 0.0);
-        assert!(!is_stale(&world), "a heading is good for a second");
-        run_looking(&mut world, places, 9 * SECOND, 0.0, 0.0);
-        assert!(is_stale(&world));
-        let held = setpoints(&mut world, places);
-        assert_eq!(held.len(), 200, "it is told so");
-        assert!(held.iter().all(|(_, setpoint)| setpoint.q == last.q && setpoint.flags == 44));
-
-        fly(&mut world, places, FIELD, 50.0);
-        world.run_for(SECOND / 20);
-        assert!(!is_stale(&world), "and follows again");
-        let (_, setpoint) = setpoints(&mut world, places).pop().expect("it is told");
-        let turned = pitch_yaw_deg(last.q).1 - pitch_yaw_deg(setpoint.q).1;
-        assert_near(turned, 20.0, 0.001);
-    }
-}
-
-/// Without a position, but with a heading, the direction over ground is kept: the camera does not turn with the vehicle.
-#[test]
-fn item_178_when_only_the_position_is_missing_the_direction_over_ground_is_kept() {
-    let (mut world, places) = looking_at(BELOW, true);
-    for tick in 1..=100 {
-        turn_vehicle(&mut world, places, f64::from(tick));
-        run_looking(&mut world, places, SECOND / 10, 0.0, 0.0);
-    }
-    assert!(world.snapshot().gimbals[0].setpoint.clone().expect("a setpoint").stale);
-    let (_, setpoint) = setpoints(&mut world, places).pop().expect("it is told");
-    assert_near(pitch_yaw_deg(setpoint.q).0, -36.653, 0.001);
-    assert_near(pitch_yaw_deg(setpoint.q).1, 34.176 - 100.0, 0.001);
-}
-
-/// "If hypot < 0.5 m keep the last yaw" (protocol notes 2.5): straight above a place any yaw is right, and the last one is
-/// kept over ground also while the vehicle turns. Behind it the gimbal looks back, and pitch never passes straight down.
-#[test]
-fn overhead_the_last_yaw_is_kept() {
-    let (mut world, places) = with_gimbal_that(endless_yaw(), three_links());
-    look(&mut world, places, 0.0, 0.0);
-    let from_the_south = |metres: f64| [FIELD[0] + metres / 111_190.0, FIELD[1], FIELD[2]];
-    fly(&mut world, places, from_the_south(-40.0), 0.0);
-    let place = roi_location(0, [FIELD[0], FIELD[1]], 438.0);
-    assert_eq!(world.result_of(places.ground, GCS, &place), Some(ACCEPTED));
-    world.forget();
-    for step in -400_i32..=400 {
-        let metres = f64::from(step) / 10.0;
-        let heading = metres;
-        world.run_for(SECOND / 20);
-        look(&mut world, places, 0.0, 0.0);
-        world.forget();
-        fly(&mut world, places, from_the_south(metres), heading);
-        world.run_for(SECOND / 20);
-        let (_, setpoint) = setpoints(&mut world, places).pop().expect("it is told");
-        let (pitch, yaw) = pitch_yaw_deg(setpoint.q);
-        let over_ground = yaw + heading;
-        // Half a metre short of it the yaw is the same as long before it; beyond that it is the other way round.
-        let expected = if metres < 0.49 { 0.0 } else { 180.0 };
-        if (metres - 0.5).abs() > 0.02 {
-            let miss = (over_ground - expected + 540.0).rem_euclid(360.0) - 180.0;
-            assert_near(miss, 0.0, 0.02);
-        }
-        assert!((-90.0..-50.0).contains(&(pitch - 1e-3)), "{pitch} at {metres} m");
-        assert_near(pitch, (-(50.0_f64.atan2(metres.abs())).to_degrees()).max(LOWEST), 0.1);
-    }
-}
-
-/// At the place itself there is no direction at all: the last one is kept, and without any nothing is told.
-#[test]
-fn at_the_place_itself_nothing_turns() {
-    let (mut world, places) = with_gimbal();
-    fly(&mut world, places, FIELD, 0.0);
-    let here = roi_location(0, [FIELD[0], FIELD[1]], FIELD[2] as f32);
-    assert_eq!(world.result_of(places.ground, GCS, &here), Some(ACCEPTED));
-    run_flying(&mut world, places, SECOND, FIELD, 10.0);
-    assert_eq!(setpoints(&mut world, places), []);
-    assert_eq!(world.snapshot().gimbals[0].roi.as_ref().map(|roi| roi.altitude_amsl_m), Some(FIELD[2]));
-    run_flying(&mut world, places, SECOND / 2, [FIELD[0] - 0.001, FIELD[1], FIELD[2]], 10.0);
-    let towards = setpoints(&mut world, places).pop().expect("it is away").1;
-    assert_near(pitch_yaw_deg(towards.q).1, -10.0, 0.01);
-    run_flying(&mut world, places, SECOND / 2, FIELD, 10.0);
-    let kept = setpoints(&mut world, places).pop().expect("it is told").1;
-    assert_near(pitch_yaw_deg(kept.q).1, -10.0, 0.01);
-}
-
-/// A place behind the end stops is looked at from the nearer end. The camera does not swing round for the little by which
-/// positions wobble, but it does when the other end is clearly nearer.
-#[test]
-fn behind_the_end_stops_the_camera_does_not_swing_to_and_fro() {
-    let (mut world, places) = with_gimbal();
-    look(&mut world, places, 0.0, 100.0);
-    let south = roi_location(0, [FIELD[0] - 0.01, FIELD[1]], 488.0);
-    fly(&mut world, places, FIELD, 10.0);
-    assert_eq!(world.result_of(places.ground, GCS, &south), Some(ACCEPTED));
-    world.forget();
-    let side = 2.0_f64.to_degrees();
-    // 180° minus the heading is where the place is from the nose.
-    for (heading, yaw) in [
-        (10.0, side),
-        (1.0, side),
-        (-1.0, side),
-        (-3.0, side),
-        (2.0, side),
-        (-4.0, side),
-        (-8.0, -side),
-        (4.0, -side),
-        (0.0, -side),
-        (8.0, side),
-        (70.0, 110.0),
-    ] {
-        run_flying(&mut world, places, SECOND / 10, FIELD, heading);
-        let told = setpoints(&mut world, places).pop().expect("it is told").1;
-        assert_near(pitch_yaw_deg(told.q).1, yaw, 0.01);
-    }
-}
-
-/// The antimeridian is a line on maps only.
-#[test]
-fn a_place_beyond_the_antimeridian_is_near() {
-    let (mut world, places) = with_gimbal();
-    for (longitude, place, yaw) in [(179.9999, -179.9999, 90.0), (-179.9999, 179.9999, -90.0), (180.0, -179.9999, 90.0)]
-    {
-        fly(&mut world, places, [-17.0, longitude, 100.0], 0.0);
-        look(&mut world, places, 0.0, 0.0);
-        assert_eq!(world.result_of(places.ground, GCS, &roi_location(0, [-17.0, place], 100.0)), Some(ACCEPTED));
-        assert_near(pitch_yaw_deg(only_setpoint(&mut world, places).q).1, yaw, 0.001);
-    }
-}
-
 /// Client checklist E110: "(MAVSDK 1.4) Same with p1 = NaN: all gimbals (or the only one)." A-64: an id is honoured.
 #[test]
 fn client_item_e110_a_place_is_for_the_gimbal_that_is_named() {
@@ -614,67 +355,6 @@ fn a_region_of_interest_passes_the_gate() {
     assert_eq!(world.result_of(places.ground, GCS, &roi_location(0, BELOW, 388.0)), Some(FAILED));
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
-
-    /// "pointing (ROI) against an independent WGS-84 reference fed the same quantised inputs, as the angle between
-    /// direction vectors: under 0.02° from 20 m to 20 km, at any latitude and attitude".
-    #[test]
-    fn the_gimbal_looks_where_an_independent_reference_says(
-        latitude in -89.9..89.9_f64, longitude in -180.0..180.0_f64, height in 30.0..3_000.0_f64,
-        distance in 20.0..20_000.0_f64, azimuth in 0.0..360.0_f64, heading in -180.0..180.0_f64,
-        tilt in -40.0..40.0_f64, accepts_north in any::<bool>(),
-    ) {
-        let (mut world, places) = with_gimbal_that(free_gimbal(), three_links());
-        introduce_free(&mut world, places, if accepts_north { 44 | 128 } else { 44 });
-        let at = [latitude, longitude, height];
-        let place = moved(at, distance, azimuth);
-        world.send(places.autopilot, AUTOPILOT, &px4_heartbeat());
-        let q = tilted(heading, tilt);
-        let mut state = crate::support::script::autopilot_state(world.now, MavId::new(0, 0), 0.0);
-        state.q = q;
-        world.send(places.autopilot, AUTOPILOT, &MavMessage::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE(state));
-        let position = global_position(world.now, at, 10.0);
-        world.send(places.autopilot, AUTOPILOT, &position);
-
-        let command = roi_location(0, [place[0], place[1]], place[2] as f32);
-        prop_assert_eq!(world.result_of(places.ground, GCS, &command), Some(ACCEPTED));
-
-        let setpoint = only_setpoint(&mut world, places);
-        let quantised = |degrees: f64| (degrees * 1e7).round() / 1e7;
-        let from = [quantised(at[0]), quantised(at[1]), (at[2] * 1e3).round() / 1e3];
-        let expected = direction(from, [quantised(place[0]), quantised(place[1]), f64::from(place[2] as f32)]);
-        // The heading as the quaternion on the wire has it.
-        let sent = UnitQuaternion::from_quaternion(Quaternion::new(q[0], q[1], q[2], q[3]).cast::<f64>());
-        let nose = sent * Vector3::x();
-        let seen = sight(&setpoint, nose.y.atan2(nose.x).to_degrees());
-        let error = seen.angle(&expected).to_degrees();
-        prop_assert!(error < 0.02, "{error}°");
-    }
-}
-
-/// What the limits of the scripted gimbal leave of straight down.
-const LOWEST: f64 = -85.943_669_269_623_48;
-
-/// A gimbal whose yaw turns without end; its pitch ends at −1.5 rad.
-fn endless_yaw() -> CapFlags {
-    usual_capabilities() | CapFlags::SUPPORTS_INFINITE_YAW
-}
-
-fn free_gimbal() -> CapFlags {
-    endless_yaw()
-}
-
-/// The gimbal has no end stops at all, and looks ahead.
-fn introduce_free(world: &mut World, places: Places, flags: u16) {
-    let mut information = device_information(world.now, free_gimbal());
-    (information.pitch_min, information.pitch_max) = (NAN, NAN);
-    world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_INFORMATION(information));
-    let status = device_status(world.now, flags, 0.0, 0.0);
-    world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status));
-    world.forget();
-}
-
 /// A ground station in control looks at a place from [`FIELD`], heading North.
 fn looking_at(place: [f64; 2], has_neutral: bool) -> (World, Places) {
     let mut capabilities = usual_capabilities();
@@ -691,6 +371,14 @@ fn looking_at(place: [f64; 2], has_neutral: bool) -> (World, Places) {
 fn end_roi(world: &mut World, places: Places) {
     assert_eq!(world.result_of(places.ground, GCS, &command_long(MANAGER, 197, &[])), Some(ACCEPTED));
     world.forget();
+}
+
+/// What the limits of the scripted gimbal leave of straight down.
+const LOWEST: f64 = -85.943_669_269_623_48;
+
+/// A gimbal whose yaw turns without end; its pitch ends at −1.5 rad.
+fn endless_yaw() -> CapFlags {
+    usual_capabilities() | CapFlags::SUPPORTS_INFINITE_YAW
 }
 
 /// The line of sight that a setpoint asks for, in North, East, Down, on a vehicle that looks to `heading_deg`.
@@ -714,26 +402,4 @@ fn direction(from: [f64; 3], to: [f64; 3]) -> Vector3<f64> {
         map_3d::Ellipsoid::WGS84,
     );
     Vector3::new(north, east, -up)
-}
-
-/// A place so many metres away on a plane that touches the ground, at a height of zero.
-fn moved([latitude, longitude, _]: [f64; 3], distance: f64, azimuth: f64) -> [f64; 3] {
-    let (east, north) = (distance * azimuth.to_radians().sin(), distance * azimuth.to_radians().cos());
-    let (latitude, longitude, _) = map_3d::enu2geodetic(
-        east,
-        north,
-        0.0,
-        latitude.to_radians(),
-        longitude.to_radians(),
-        0.0,
-        map_3d::Ellipsoid::WGS84,
-    );
-    [latitude.to_degrees(), (longitude.to_degrees() + 180.0).rem_euclid(360.0) - 180.0, 0.0]
-}
-
-/// A vehicle that looks to `heading_deg` and banks and climbs.
-fn tilted(heading_deg: f64, tilt_deg: f64) -> [f32; 4] {
-    let radians = f64::to_radians;
-    let q = UnitQuaternion::from_euler_angles(radians(tilt_deg / 2.0), radians(tilt_deg), radians(heading_deg));
-    [q.w as f32, q.i as f32, q.j as f32, q.k as f32]
 }
