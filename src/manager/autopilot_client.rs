@@ -120,7 +120,7 @@ impl GimbalManager {
             Heard::Steady { crept } => {
                 self.autopilot_client.is_waiting = false;
                 let is_obeyed = self.tracking.source() == Some(autopilot) && self.autopilot_client.place.is_none();
-                let goes_on = crept || demand.turns() && self.is_rate_to_go_on(now);
+                let goes_on = if demand.turns() { self.is_rate_to_go_on(now, crept) } else { crept };
                 if is_obeyed && goes_on && self.gate(now, autopilot, around) == Ok(Voice::Whole) {
                     self.obey_autopilot(now, autopilot, demand, around);
                 }
@@ -129,13 +129,14 @@ impl GimbalManager {
         }
     }
 
-    /// Whether a rate that the stream repeats unchanged is to be asked for again. It lasts as long as one that was set by
-    /// a command: who set it may be gone, and ArduPilot repeats it all the same.
-    fn is_rate_to_go_on(&self, now: Timestamp) -> bool {
+    /// Whether a rate that the stream repeats is to be asked for again, unchanged or `crept`. It lasts as long as one that
+    /// was set by a command: who set it may be gone, and ArduPilot repeats it all the same, be it not exactly the same
+    /// each time.
+    fn is_rate_to_go_on(&self, now: Timestamp, crept: bool) -> bool {
         let client = &self.autopilot_client;
         let longest = self.rules.command_rate_timeout;
         let is_fresh = client.stream.changed().is_some_and(|at| now.since(at) < longest);
-        now.since(client.obeyed) >= REFRESH_EVERY && (longest.is_zero() || is_fresh)
+        (crept || now.since(client.obeyed) >= REFRESH_EVERY) && (longest.is_zero() || is_fresh)
     }
 
     fn obey_autopilot(&mut self, now: Timestamp, autopilot: MavId, demand: &Demand, around: Surroundings<'_>) {

@@ -256,6 +256,32 @@ fn a_rate_that_nobody_changes_ends() {
     assert_eq!(flight.told(), after, "it has stopped");
 }
 
+/// "Unchanged" is a rate also when it is not exactly the same each time: what creeps asks for nothing new.
+#[test]
+fn a_rate_that_only_jitters_ends_as_one_that_nobody_changes() {
+    for by in [0.02, 0.2] {
+        let mut flight = Flight::new(presenting());
+        let jitter = |flight: &mut Flight, seconds: usize| {
+            for _ in 0..seconds * 25 {
+                flight.demand(turning(2.0 + by, 0.0), PERIOD);
+                flight.demand(turning(2.0 - by, 0.0), PERIOD);
+            }
+        };
+        jitter(&mut flight, 9);
+        let before = flight.told();
+        jitter(&mut flight, 1);
+        assert_ne!(flight.told(), before, "{by}: it turns");
+        jitter(&mut flight, 3);
+        let after = flight.told();
+        jitter(&mut flight, 30);
+        assert_eq!(flight.told(), after, "{by}: it has stopped");
+        assert_eq!(flight.stream(), "steady");
+
+        // And what is asked for next is done.
+        flight.demand(setpoint(-45.0, 30.0, 0), SECOND);
+        assert_eq!(flight.told(), Some((44, -45, 30)));
+    }
+}
 /// PX4 with `MNT_MODE_OUT` 2 drives a device as well, and in its own way: 283 is asked of everybody, 284 comes to no component
 /// in particular, with frame bits, with NaN before it has any input, and with the identity beside a rate.
 #[test]
