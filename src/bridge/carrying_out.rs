@@ -87,9 +87,11 @@ impl Bridge {
     pub(super) fn carry_out_for_manager(&mut self, now: Timestamp, at: usize, component: u8, output: ManagerOutput) {
         match output {
             ManagerOutput::Reply { to, channel, message } => {
-                // Who cannot be learned, such as a component 0, is where it spoke.
+                // Who cannot be learned, such as a component 0, is where it spoke; and what another vehicle's autopilot is
+                // answered is not for ours, which has the same id.
                 let known = self.router.route_known(now, to);
-                let channels = if known.is_empty() { channel.into() } else { known };
+                let is_namesake = self.channels.role(channel).is_some_and(|role| self.is_namesake(now, role, to));
+                let channels = if known.is_empty() || is_namesake { channel.into() } else { known };
                 self.answer(now, channels, component, &message);
             }
             ManagerOutput::Answer { channel, message } => self.answer(now, channel.into(), component, &message),

@@ -70,8 +70,8 @@ impl Bridge {
             }
             _ => {}
         }
-        // Under our own ids stands who asks over HTTP, whom nobody else keeps in control.
-        if !ours {
+        // Under our own ids stands who asks over HTTP, whom nobody else keeps in control; nor does another the autopilot.
+        if !ours && !self.is_namesake(now, role, source) {
             for gimbal in self.roster.iter_mut() {
                 gimbal.manager.handle_heard(now, source);
             }
@@ -82,7 +82,7 @@ impl Bridge {
         if !ours {
             self.handle_device(now, Place { link, channel: from }, role, frame);
         }
-        self.handle_for_us(now, from, frame);
+        self.handle_for_us(now, from, role, frame);
         if self.handle_for_presented(now, Place { link, channel: from }, role, frame)
             || self.is_of_hosted_manager(link, frame)
         {
@@ -104,6 +104,11 @@ impl Bridge {
         }
         self.take_vehicle_frame(now, frame);
         self.show_vehicle(now, frame.message_id());
+    }
+
+    /// Whether `source` has the id of our autopilot, and is another vehicle's.
+    pub(super) fn is_namesake(&self, now: Timestamp, role: Role, source: MavId) -> bool {
+        self.autopilot == Some(source) && !self.is_believed_autopilot(now, role, source)
     }
 
     /// Whether `source` is our autopilot, and not another vehicle's of the same id.
@@ -186,7 +191,7 @@ impl Bridge {
     }
 
     /// Requests addressed to our managers.
-    fn handle_for_us(&mut self, now: Timestamp, from: ChannelId, frame: &Frame<'_>) {
+    fn handle_for_us(&mut self, now: Timestamp, from: ChannelId, role: Role, frame: &Frame<'_>) {
         let Some(system) = self.identity.system() else { return };
         if !matches!(
             frame.message_id(),
@@ -212,7 +217,7 @@ impl Bridge {
         }
         let Some(request) = read_request(frame) else { return };
         let sender = Sender { id: frame.source(), channel: from };
-        let other_vehicle = self.is_other_vehicle(now, sender.id);
+        let other_vehicle = self.is_other_vehicle(now, role, sender.id);
         let around = surroundings(&self.vehicle, self.autopilot, &self.ranks);
         let around = Surroundings { overheard, other_vehicle, ..around };
         // Who has no gimbal yet says so to who asks it, and to everybody only while nobody here has one.
@@ -288,14 +293,17 @@ impl Bridge {
         self.vehicles[usize::from(system)].is_some_and(|known| now.since(known.heard) < VEHICLE_GONE)
     }
 
-    /// D5: whether `id` is in a system that has an autopilot and is not ours.
+    /// D5: whether `id`, on a link of that role, is in a system that has an autopilot and is not ours, or is one that has
+    /// our autopilot's id.
     ///
     /// Once its autopilot was heard it has one for good, however rarely we hear it; and who has an autopilot's component id
     /// is one, with or without a heartbeat. Only who calls itself a ground station is believed when no autopilot is heard.
-    fn is_other_vehicle(&self, now: Timestamp, id: MavId) -> bool {
+    fn is_other_vehicle(&self, now: Timestamp, role: Role, id: MavId) -> bool {
         let was_one = id.component == component::AUTOPILOT1 || self.vehicles[usize::from(id.system)].is_some();
-        Some(id.system) != self.identity.system()
-            && (self.is_vehicle(now, id.system) || was_one && !self.ranks.is_ground_station(id))
+        let is_in_ours = Some(id.system) == self.identity.system() && self.is_believed(role, id.system);
+        let is_in_other =
+            !is_in_ours && (self.is_vehicle(now, id.system) || was_one && !self.ranks.is_ground_station(id));
+        is_in_other || self.is_namesake(now, role, id)
     }
 
     fn is_state_for_gimbals(&self, frame: &Frame<'_>) -> bool {
@@ -314,12 +322,16 @@ impl Bridge {
         if self.identity.system().is_none() {
             return ChannelSet::EMPTY;
         }
+        // What an autopilot of the id of ours says to its own gimbal, which may have the id of ours too, is not for ours.
+        if self.is_namesake(now, role, frame.source()) {
+            return ChannelSet::EMPTY;
+        }
         if let Target::Component(target) = frame.target() {
             return gimbals.intersection(self.router.routes().component_channels(target));
         }
         // A gimbal that has just been switched on would take another vehicle's system id for its own, the state of
         // another vehicle would turn our camera, and its commands are not for us.
-        if self.is_other_vehicle(now, frame.source()) {
+        if self.is_other_vehicle(now, role, frame.source()) {
             return ChannelSet::EMPTY;
         }
         match frame.message_id() {

@@ -4,7 +4,9 @@
 use std::time::Duration;
 
 use gimbald::bridge::settings::{Role, Settings, SystemId, Transport};
+use gimbald::gimbals::settings::{GimbalSettings, Takeover};
 use gimbald::manager::settings::{ControlSettings, Firewall};
+use gimbald::timestamp::Timestamp;
 use gimbald::wire::MavId;
 use gimbald::wire::dialect::{
     ATTITUDE_DATA, COMMAND_LONG_DATA, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA,
@@ -12,8 +14,9 @@ use gimbald::wire::dialect::{
 };
 
 use crate::support::script::{
-    ACCEPTED, NAN, ack, command_long, device_information, device_status, gimbal_heartbeat, ground_heartbeat, of,
-    pitchyaw, px4_heartbeat, quaternion, set_interval, take_control, usual_capabilities,
+    ACCEPTED, DENIED, NAN, ack, autopilot_state, command_long, configure, device_information, device_status,
+    gimbal_heartbeat, ground_heartbeat, of, pitchyaw, px4_heartbeat, quaternion, set_interval, set_pitchyaw,
+    take_control, usual_capabilities,
 };
 use crate::support::world::{AUTOPILOT, GCS, GIMBAL, MANAGER, Place, Places, World, heartbeat, link, three_links};
 
@@ -79,6 +82,77 @@ fn a57_a_second_vehicle_under_our_system_id_is_not_believed() {
     assert_eq!(world.snapshot().vehicle.heading_deg.map(f64::round), Some(115.0));
 }
 
+/// D5: "Other vehicles' systems are routed, but never gate, latch or steer", and one under our system id is another vehicle
+/// where it is not believed. It is answered where it spoke: our own autopilot, to which the same ids lead, has not asked.
+#[test]
+fn a57_a_second_vehicle_under_our_system_id_has_no_say() {
+    let camera = GimbalSettings { takeover: Takeover::Ask, ..GimbalSettings::found("camera".to_owned()) };
+    let control =
+        ControlSettings { open_when_unclaimed: false, lease_timeout: 3 * SECOND, ..ControlSettings::default() };
+    let (mut world, places) = World::empty(Settings { gimbals: vec![camera], control, ..three_links() });
+    introduce(&mut world, places.gimbal, GIMBAL);
+    let status = GIMBAL_DEVICE_ATTITUDE_STATUS_DATA { time_boot_ms: 1 << 30, ..device_status(world.now, 44, 0.0, 0.0) };
+    let gimbal = (SECOND / 10, places.gimbal, GIMBAL, MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status));
+    let station = (SECOND, places.ground, GCS, ground_heartbeat());
+    let ours = (SECOND, places.autopilot, AUTOPILOT, px4_heartbeat());
+    let other = (SECOND, places.ground, AUTOPILOT, px4_heartbeat());
+    world.run_with(3 * SECOND, &[gimbal.clone(), station.clone(), ours, other.clone()]);
+    assert_eq!(world.result_of(places.ground, GCS, &take_control()), Some(ACCEPTED));
+
+    for asked in [
+        take_control(),
+        configure([1.0, 1.0], [-1.0, -1.0]),
+        configure([0.0, 0.0], [-1.0, -1.0]),
+        configure([-1.0, -1.0], [-2.0, -2.0]),
+        pitchyaw(-10.0, 0.0, NAN, NAN, 44.0),
+        command_long(MANAGER, 197, &[154.0, NAN, NAN, NAN, NAN, NAN, NAN]),
+    ] {
+        assert_eq!(world.result_of(places.ground, AUTOPILOT, &asked), Some(DENIED), "{asked:?}");
+        assert!(world.take(places.autopilot).iter().all(|arrival| arrival.id() != 77), "{asked:?}");
+    }
+    world.forget();
+    world.send(places.ground, AUTOPILOT, &set_pitchyaw(NAN, NAN, 0.0, 0.1, 44));
+    assert_eq!(world.take_messages::<GIMBAL_DEVICE_SET_ATTITUDE_DATA>(places.gimbal), []);
+    let in_control = |world: &World| {
+        let camera = world.snapshot().gimbals[0].clone();
+        (camera.primary, camera.secondary, camera.lender)
+    };
+    let id = |id: MavId| Some(id.to_string());
+    assert_eq!(in_control(&world), (id(GCS), None, None));
+    let rejected = world.snapshot().gimbals[0].rejected.clone();
+    assert!(rejected.len() == 1 && rejected["1/1"].len() == 1 && rejected["1/1"]["other_vehicle"] == 7, "{rejected:?}");
+
+    // Ours is obeyed all the same, and the other does not keep it in control when it is silent.
+    assert_eq!(world.result_of(places.autopilot, AUTOPILOT, &take_control()), Some(ACCEPTED));
+    assert_eq!(in_control(&world), (id(AUTOPILOT), None, id(GCS)));
+    world.run_with(4 * SECOND, &[gimbal, station, other]);
+    assert_eq!(in_control(&world), (id(GCS), None, None));
+}
+
+/// R18: what such a vehicle's autopilot says to everybody, or to its own gimbal, which may have the id of ours, does not
+/// reach ours: the state of another vehicle would tilt its horizon.
+#[test]
+fn a57_what_a_second_vehicle_under_our_system_id_says_is_not_for_our_gimbal() {
+    let (mut world, places) = with_device();
+    world.send(places.autopilot, AUTOPILOT, &px4_heartbeat());
+    let state = |target| MavMessage::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE(autopilot_state(Timestamp::ZERO, target, 200.0));
+    let said = [
+        px4_heartbeat(),
+        state(MavId::new(0, 0)),
+        state(GIMBAL),
+        command_long(MavId::new(0, 0), 512, &[283.0]),
+        command_long(GIMBAL, 512, &[283.0]),
+    ];
+    for (from, heard) in [(places.ground, false), (places.autopilot, true)] {
+        for message in &said {
+            world.forget();
+            let sent = world.send(from, AUTOPILOT, message);
+            let is_heard = world.take(places.gimbal).iter().any(|arrival| arrival.bytes == sent);
+            assert_eq!(is_heard, heard, "{message:?}");
+        }
+    }
+}
+
 /// "Latch only from links marked `autopilot`": while we use the fallback id for want of an autopilot, a vehicle that has
 /// it is not ours, and neither is its gimbal; the user is told.
 #[test]
@@ -97,6 +171,9 @@ fn a57_a_vehicle_that_has_the_fallback_id_is_not_ours() {
 
     // A gimbal on its own link is ours all the same, and so is the autopilot when it comes.
     introduce(&mut world, places.gimbal, MavId::new(1, 171));
+    let take = command_long(MavId::new(1, 192), 1001, &[-2.0, -2.0, -1.0, -1.0, NAN, NAN, 0.0]);
+    assert_eq!(world.result_of(places.ground, AUTOPILOT, &take), Some(DENIED), "that vehicle does not have it");
+    assert_eq!(world.snapshot().gimbals[0].rejected["1/1"]["other_vehicle"], 1);
     world.run_with(5 * SECOND, &[(SECOND, places.autopilot, AUTOPILOT, px4_heartbeat())]);
     let snapshot = world.snapshot();
     assert_eq!((snapshot.vehicle.system_id, snapshot.gimbals[0].device.as_deref()), (Some(1), Some("1/171")));
