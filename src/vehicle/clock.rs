@@ -24,8 +24,12 @@ const SPAN: Duration = Duration::from_secs(10);
 /// A clock that jumps back further was started anew.
 const STEP_BACK_US: i64 = 1_000_000;
 
-/// A stamp this far ahead of its time, and one in a thousand of the time it was not heard for, is from another clock.
+/// A stamp this far ahead of its time, and one in a thousand of the time it was not heard for, is from another clock, …
 const STEP_AHEAD_US: i64 = 1_000_000;
+
+/// … but for the message whose stamps are believed: a queue that held back all there was for long, such as that of a narrow
+/// radio, and does not any more, makes it this much faster at once. Who starts again begins to count anew.
+const QUEUED_US: i64 = 10_000_000;
 
 /// The message whose stamps are believed was not heard for so long: one that agrees with it takes its place, so that it
 /// is one that comes often …
@@ -78,14 +82,14 @@ impl BootClock {
             return None;
         }
         let told_us = stamp.nearest_to(track.time_at(now));
-        if track.agrees(now, told_us) {
+        let is_believed = is_reference || now.since(track.heard) > REFERENCE_SILENT;
+        if track.agrees(now, told_us, if is_believed { QUEUED_US } else { STEP_AHEAD_US }) {
             if is_reference || now.since(track.heard) > REFERENCE_SELDOM {
                 (track.reference, track.stamp, track.heard) = (message_id, stamp, now);
             }
             return Some(track.take(now, told_us));
         }
-        let believed = is_reference || now.since(track.heard) > REFERENCE_SILENT;
-        if believed && matches!(stamp, Stamp::Millis(_)) {
+        if is_believed && matches!(stamp, Stamp::Millis(_)) {
             self.track = Some(Track::new(now, message_id, stamp));
             self.restarts += 1;
         }
@@ -116,12 +120,12 @@ impl Track {
         micros(now) - self.least[0].min(self.least[1])
     }
 
-    /// Whether a time fits this clock: not before what was told, nor ahead of now. It may lag, as what was stuck in a
-    /// queue does.
-    fn agrees(&self, now: Timestamp, told_us: i64) -> bool {
+    /// Whether a time fits this clock: not before what was told, nor further ahead of now than `step_ahead_us`. It may lag,
+    /// as what was stuck in a queue does.
+    fn agrees(&self, now: Timestamp, told_us: i64, step_ahead_us: i64) -> bool {
         let unheard_us = i64::try_from(now.since(self.heard).as_micros()).unwrap_or(i64::MAX);
         let ahead = told_us - self.time_at(now);
-        told_us > self.told_us - STEP_BACK_US && ahead < STEP_AHEAD_US.saturating_add(unheard_us / 1_000)
+        told_us > self.told_us - STEP_BACK_US && ahead < step_ahead_us.saturating_add(unheard_us / 1_000)
     }
 
     /// Whether a count is at its turn, more or less.
@@ -258,7 +262,8 @@ mod tests {
             (90_000, 88_000),
             (90_000, 150_000),
             (34 * DAY_MS, 5_000),
-            ((1 << 32) - 10, 5_000),
+            // Where the count is at its turn anyway; less would be no more than what a queue had held back.
+            ((1 << 32) - 10, 15_000),
             (5_000, (1 << 32) - 10),
         ] {
             let mut clock = BootClock::default();
@@ -283,6 +288,28 @@ mod tests {
             assert_eq!(late, ms(5_000 - step * 100));
         }
         assert_eq!(clock.restarts(), 0);
+    }
+
+    /// A radio that held back all messages equally, for longer than the fastest counts, and does not any more; also when nothing
+    /// was heard in between, and whichever message comes first then.
+    #[test]
+    fn a_queue_that_is_gone_is_no_restart() {
+        for (late, silent, first) in [(1_500, 20, ATTITUDE), (8_000, 20, ATTITUDE), (8_000, 3_000, POSITION)] {
+            let mut clock = BootClock::default();
+            let mut now = 0;
+            while now < 25_000 {
+                now += 20;
+                clock.handle_stamp(at(now), ATTITUDE, millis(100_000 + now - late));
+                clock.handle_stamp(at(now), POSITION, millis(100_000 + now - late));
+            }
+            now += silent;
+            assert_eq!(clock.handle_stamp(at(now), first, millis(100_000 + now)), ms(0), "{late} ms");
+            assert_eq!((clock.restarts(), clock.time_us(at(now))), (0, Some((100_000 + now) * 1_000)));
+            // What overtook nothing is late again, and who starts again begins anew.
+            assert_eq!(clock.handle_stamp(at(now), POSITION, millis(100_000 + now - 700)), ms(700));
+            clock.handle_stamp(at(now + 40), first, millis(15));
+            assert_eq!((clock.restarts(), clock.time_us(at(now + 40))), (1, Some(15_000)));
+        }
     }
 
     /// Some senders stamp some messages by another clock, or not at all.

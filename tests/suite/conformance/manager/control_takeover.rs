@@ -6,7 +6,7 @@ use gimbald::bridge::settings::Settings;
 use gimbald::gimbals::settings::{GimbalSettings, Takeover};
 use gimbald::manager::settings::ControlSettings;
 use gimbald::wire::MavId;
-use gimbald::wire::dialect::MavMessage;
+use gimbald::wire::dialect::{ATTITUDE_DATA, MavMessage};
 
 use super::{COMPANION, SECOND, only_setpoint, run_looking, setpoints, told_control, with_gimbal_that};
 use crate::support::script::{
@@ -269,6 +269,46 @@ fn with(takeover: Takeover, control: ControlSettings) -> (World, Places) {
     let (mut world, places) = with_gimbal_that(usual_capabilities(), Settings { control, gimbals, ..three_links() });
     world.send(places.autopilot, AUTOPILOT, &px4_heartbeat());
     world.send(places.autopilot, COMPANION, &heartbeat(18, 8));
+/// "When the autopilot has started again, what it had goes back": it has not when only its messages come faster than
+/// before, because a radio does not hold them back any more.
+#[test]
+fn an_autopilot_that_is_heard_sooner_than_before_has_not_started_again() {
+    for late_ms in [1_500, 8_000] {
+        let (mut world, places) = under(Takeover::Open);
+        let tell = |world: &mut World, boot_ms: u64| {
+            let attitude = ATTITUDE_DATA {
+                time_boot_ms: boot_ms as u32,
+                roll: 0.0,
+                pitch: 0.0,
+                yaw: 0.0,
+                rollspeed: 0.0,
+                pitchspeed: 0.0,
+                yawspeed: 0.0,
+            };
+            world.send(places.autopilot, AUTOPILOT, &MavMessage::ATTITUDE(attitude));
+            run_looking(world, places, SECOND / 10, 0.0, 0.0);
+        };
+        let boot_ms = |world: &World| 100_000 + world.now.as_micros() / 1_000;
+        assert_eq!(world.result_of(places.ground, GCS, &take_control()), Some(ACCEPTED));
+        assert_eq!(world.result_of(places.autopilot, AUTOPILOT, &take_control()), Some(ACCEPTED));
+        for _ in 0..250 {
+            let told = boot_ms(&world) - late_ms;
+            tell(&mut world, told);
+        }
+        world.send(places.autopilot, AUTOPILOT, &set_pitchyaw(NAN, NAN, 0.0, 0.1, 44));
+        for _ in 0..10 {
+            let told = boot_ms(&world);
+            tell(&mut world, told);
+        }
+        assert_eq!(in_control(&mut world, places), (AUTOPILOT, NOBODY), "{late_ms} ms");
+        let setpoint = world.snapshot().gimbals[0].setpoint.clone();
+        assert_eq!(setpoint.map(|it| it.mode), Some("rate".to_owned()), "it goes on to turn");
+
+        tell(&mut world, 200);
+        assert_eq!(in_control(&mut world, places), (GCS, NOBODY), "{late_ms} ms");
+    }
+}
+
     world.send(places.ground, SCRIPT, &heartbeat(0, 8));
     world.send(places.ground, TABLET, &heartbeat(6, 8));
     world.forget();
