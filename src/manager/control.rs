@@ -162,10 +162,11 @@ impl Control {
     ) -> Result<Vec<Change>, Refusal> {
         let mut after = self.clone();
         let primary = after.read_quirk(now, sender, configure.primary, policy);
-        let changes = [
-            after.settle(now, Place::Primary, sender, primary, policy)?,
-            after.settle(now, Place::Secondary, sender, configure.secondary, policy)?,
-        ];
+        let of_primary = after.settle(now, Place::Primary, sender, primary, policy)?;
+        if after.primary() != Some(sender) {
+            self.check_free_secondary(sender, configure.secondary, policy)?;
+        }
+        let changes = [of_primary, after.settle(now, Place::Secondary, sender, configure.secondary, policy)?];
         *self = after;
         Ok(changes.into_iter().flatten().collect())
     }
@@ -226,6 +227,19 @@ impl Control {
         } else {
             claim
         }
+    }
+
+    /// Fails where `sender` may not have the secondary place that nobody has, nor give it away.
+    ///
+    /// From there anything is demanded while the primary is silent: who may not take primary control from its holder
+    /// would steer in its stead all the same. So that place is the holder's to give.
+    fn check_free_secondary(&self, sender: MavId, claim: Claim, policy: Policy<'_>) -> Result<(), Refusal> {
+        let is_claimed = matches!(claim, Claim::Take | Claim::Assign(_)) && self.secondary.is_none();
+        let Some(holder) = self.primary().filter(|holder| is_claimed && *holder != sender) else { return Ok(()) };
+        let rank = |id| policy.ranks.of(id, policy.autopilot);
+        let attempt =
+            takeover::Attempt { taker: rank(sender), holder: rank(holder), borrows: false, takes_back: false };
+        takeover::check(policy.takeover, attempt)
     }
 
     /// Does with one place what `sender` claims, if it may.

@@ -1,13 +1,14 @@
 //! Who may take a place from a holder that lives and has not released it.
 //!
 //! The Gimbal Protocol v2 leaves it to politeness ("open"); the other policies are ours. A place that nobody holds, or
-//! whose holder was silent for the lease, is free under each, and a holder gives its own place to whom it likes.
+//! whose holder was silent for the lease, is free under each, but for the secondary place beside a primary, which is that
+//! one's; and a holder gives its own place to whom it likes.
 
 use super::super::rank::Rank;
 use super::super::request::Refusal;
 use crate::gimbals::settings::Takeover;
 
-/// What somebody is about to do to a place that another holds.
+/// What somebody is about to do to a place that another holds, or has at its disposal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Attempt {
     pub(super) taker: Rank,

@@ -108,8 +108,12 @@ impl Rule {
     pub fn configure(&mut self, now: Timestamp, sender: MavId, params: [f32; 4]) -> u8 {
         let wishes = [wish(sender, params[0], params[1]), wish(sender, params[2], params[3])];
         let [Some(primary), Some(secondary)] = wishes else { return DENIED };
+        let becomes_primary = primary == Wish::Somebody(sender);
         // Half of it is never done.
-        if !self.may(now, sender, 0, primary) || !self.may(now, sender, 1, secondary) {
+        if !self.may(now, sender, 0, primary)
+            || !self.may(now, sender, 1, secondary)
+            || !(becomes_primary || self.may_have_free_secondary(sender, secondary))
+        {
             return DENIED;
         }
         self.grant(now, sender, 0, primary);
@@ -142,6 +146,19 @@ impl Rule {
         };
         let is_truce = self.truce.is_some_and(|until| now < until);
         by_policy && !(is_truce && place == 0 && taker.is_some())
+    }
+
+    /// "While somebody holds primary control, secondary control that nobody has is that one's to give: others get it where
+    /// the policy would give them primary control too" (`docs/configuration.md`), which nobody borrows.
+    fn may_have_free_secondary(&self, sender: MavId, wish: Wish) -> bool {
+        let [Some(primary), None] = self.holders() else { return true };
+        let is_claimed = matches!(wish, Wish::Somebody(_));
+        let by_policy = match self.takeover {
+            Takeover::Open => true,
+            Takeover::Ask | Takeover::Exclusive => false,
+            Takeover::Priority => self.rank(sender) > self.rank(primary),
+        };
+        !is_claimed || primary == sender || by_policy
     }
 
     fn grant(&mut self, now: Timestamp, sender: MavId, place: usize, wish: Wish) {

@@ -130,9 +130,10 @@ impl Court {
         Self { rule: Rule::new(takeover, AUTOPILOT, &[GCS]), said: Vec::new(), manager }
     }
 
-    /// Each holder takes its place itself.
+    /// Each holder takes its place itself, the secondary first: beside a primary its place is not free under each policy.
     fn held(mut self, holders: [Option<MavId>; 2]) -> Option<Self> {
-        for (holder, params) in holders.into_iter().zip([[-2.0, -2.0, -1.0, -1.0], [-1.0, -1.0, -2.0, -2.0]]) {
+        let [primary, secondary] = holders;
+        for (holder, params) in [(secondary, [-1.0, -1.0, -2.0, -2.0]), (primary, [-2.0, -2.0, -1.0, -1.0])] {
             if let Some(holder) = holder {
                 self.check(holder, params);
             }

@@ -67,9 +67,68 @@ fn each_policy_lets_some_take_over() {
             let mut held = [NOBODY; 2];
             held[mine] = if expected == ACCEPTED { taker } else { holder };
             assert_eq!(in_control(&mut world, places), (held[0], held[1]));
-            // And what nobody has is free under each policy.
-            assert_eq!(world.result_of(at(places, taker), taker, &claim(taker, other)), Some(ACCEPTED));
+            // And primary control that nobody has is free under each policy; secondary control, beside it, is the primary's.
+            let is_free = other == 0 || expected == ACCEPTED;
+            let other_result = if is_free { ACCEPTED } else { DENIED };
+            assert_eq!(world.result_of(at(places, taker), taker, &claim(taker, other)), Some(other_result));
         }
+    }
+}
+
+/// `takeover`: "This holds for primary and secondary control": a stranger who is denied primary control gets no secondary
+/// control beside it either, from where it would steer while the holder says nothing.
+#[test]
+fn who_may_not_take_control_does_not_get_in_beside_the_holder() {
+    for (policy, reason) in [
+        (Takeover::Ask, "holder_must_release"),
+        (Takeover::Priority, "holder_ranks_no_lower"),
+        (Takeover::Exclusive, "exclusively_held"),
+    ] {
+        let (mut world, places) = under(policy);
+        assert_eq!(world.result_of(places.ground, GCS, &take_control()), Some(ACCEPTED));
+        assert_eq!(world.result_of(places.ground, GCS, &pitchyaw(-30.0, 40.0, NAN, NAN, 44.0)), Some(ACCEPTED));
+        run_looking(&mut world, places, 3 * SECOND, -30.0, 40.0);
+        world.forget();
+
+        // For itself, and for another.
+        for secondary in [[-2.0, -2.0], [245.0, 191.0], [1.0, 192.0]] {
+            let claim = configure([-1.0, -1.0], secondary);
+            assert_eq!(world.result_of(places.ground, SCRIPT, &claim), Some(DENIED), "{policy:?}: {secondary:?}");
+        }
+        let angle = pitchyaw(-85.0, -120.0, NAN, NAN, 44.0);
+        assert_eq!(world.result_of(places.ground, SCRIPT, &angle), Some(DENIED), "{policy:?}");
+        assert_eq!(setpoints(&mut world, places), []);
+        assert_eq!(world.snapshot().gimbals[0].rejected["245/191"][reason], 3, "{policy:?}");
+        // Giving up what it does not have changes nothing, and is no claim.
+        for nothing in [[-3.0, -3.0], [0.0, 0.0], [-1.0, -1.0]] {
+            let nothing = configure([-1.0, -1.0], nothing);
+            assert_eq!(world.result_of(places.ground, SCRIPT, &nothing), Some(ACCEPTED), "{policy:?}");
+        }
+        assert_eq!(in_control(&mut world, places), (GCS, NOBODY));
+
+        // The holder gives it, also together with its own place; then who has it moves the camera.
+        assert_eq!(world.result_of(places.ground, GCS, &configure([-1.0, -1.0], [245.0, 191.0])), Some(ACCEPTED));
+        assert_eq!(world.result_of(places.ground, SCRIPT, &angle), Some(ACCEPTED), "{policy:?}");
+        assert_eq!(world.result_of(places.ground, SCRIPT, &configure([-1.0, -1.0], [-3.0, -3.0])), Some(ACCEPTED));
+        assert_eq!(world.result_of(places.ground, GCS, &configure([254.0, 190.0], [245.0, 191.0])), Some(ACCEPTED));
+        assert_eq!(in_control(&mut world, places), (TABLET, SCRIPT), "{policy:?}");
+    }
+}
+
+/// Under `"open"`, and under `"priority"` for who ranks higher, secondary control that nobody has is there for the taking.
+#[test]
+fn who_may_take_control_may_get_in_beside_the_holder() {
+    for (policy, holder, taker) in [
+        (Takeover::Open, GCS, SCRIPT),
+        (Takeover::Priority, COMPANION, GCS),
+        (Takeover::Priority, COMPANION, AUTOPILOT),
+        (Takeover::Priority, SCRIPT, COMPANION),
+    ] {
+        let (mut world, places) = under(policy);
+        assert_eq!(world.result_of(at(places, holder), holder, &take_control()), Some(ACCEPTED));
+        let claim = configure([-1.0, -1.0], [-2.0, -2.0]);
+        assert_eq!(world.result_of(at(places, taker), taker, &claim), Some(ACCEPTED), "{policy:?}: {taker}");
+        assert_eq!(in_control(&mut world, places), (holder, taker));
     }
 }
 
@@ -184,6 +243,46 @@ fn an_autopilot_that_falls_silent_gives_back_what_it_borrowed() {
     assert!(told.into_iter().all(|(primary, _)| primary != NOBODY), "nobody is never told in between");
 }
 
+/// "When the autopilot has started again, what it had goes back": it has not when only its messages come faster than
+/// before, because a radio does not hold them back any more.
+#[test]
+fn an_autopilot_that_is_heard_sooner_than_before_has_not_started_again() {
+    for late_ms in [1_500, 8_000] {
+        let (mut world, places) = under(Takeover::Open);
+        let tell = |world: &mut World, boot_ms: u64| {
+            let attitude = ATTITUDE_DATA {
+                time_boot_ms: boot_ms as u32,
+                roll: 0.0,
+                pitch: 0.0,
+                yaw: 0.0,
+                rollspeed: 0.0,
+                pitchspeed: 0.0,
+                yawspeed: 0.0,
+            };
+            world.send(places.autopilot, AUTOPILOT, &MavMessage::ATTITUDE(attitude));
+            run_looking(world, places, SECOND / 10, 0.0, 0.0);
+        };
+        let boot_ms = |world: &World| 100_000 + world.now.as_micros() / 1_000;
+        assert_eq!(world.result_of(places.ground, GCS, &take_control()), Some(ACCEPTED));
+        assert_eq!(world.result_of(places.autopilot, AUTOPILOT, &take_control()), Some(ACCEPTED));
+        for _ in 0..250 {
+            let told = boot_ms(&world) - late_ms;
+            tell(&mut world, told);
+        }
+        world.send(places.autopilot, AUTOPILOT, &set_pitchyaw(NAN, NAN, 0.0, 0.1, 44));
+        for _ in 0..10 {
+            let told = boot_ms(&world);
+            tell(&mut world, told);
+        }
+        assert_eq!(in_control(&mut world, places), (AUTOPILOT, NOBODY), "{late_ms} ms");
+        let setpoint = world.snapshot().gimbals[0].setpoint.clone();
+        assert_eq!(setpoint.map(|it| it.mode), Some("rate".to_owned()), "it goes on to turn");
+
+        tell(&mut world, 200);
+        assert_eq!(in_control(&mut world, places), (GCS, NOBODY), "{late_ms} ms");
+    }
+}
+
 /// "If alive (heard within the lease)": the lease of who lent control runs on meanwhile.
 #[test]
 fn a_lender_that_is_gone_gets_nothing_back() {
@@ -269,46 +368,6 @@ fn with(takeover: Takeover, control: ControlSettings) -> (World, Places) {
     let (mut world, places) = with_gimbal_that(usual_capabilities(), Settings { control, gimbals, ..three_links() });
     world.send(places.autopilot, AUTOPILOT, &px4_heartbeat());
     world.send(places.autopilot, COMPANION, &heartbeat(18, 8));
-/// "When the autopilot has started again, what it had goes back": it has not when only its messages come faster than
-/// before, because a radio does not hold them back any more.
-#[test]
-fn an_autopilot_that_is_heard_sooner_than_before_has_not_started_again() {
-    for late_ms in [1_500, 8_000] {
-        let (mut world, places) = under(Takeover::Open);
-        let tell = |world: &mut World, boot_ms: u64| {
-            let attitude = ATTITUDE_DATA {
-                time_boot_ms: boot_ms as u32,
-                roll: 0.0,
-                pitch: 0.0,
-                yaw: 0.0,
-                rollspeed: 0.0,
-                pitchspeed: 0.0,
-                yawspeed: 0.0,
-            };
-            world.send(places.autopilot, AUTOPILOT, &MavMessage::ATTITUDE(attitude));
-            run_looking(world, places, SECOND / 10, 0.0, 0.0);
-        };
-        let boot_ms = |world: &World| 100_000 + world.now.as_micros() / 1_000;
-        assert_eq!(world.result_of(places.ground, GCS, &take_control()), Some(ACCEPTED));
-        assert_eq!(world.result_of(places.autopilot, AUTOPILOT, &take_control()), Some(ACCEPTED));
-        for _ in 0..250 {
-            let told = boot_ms(&world) - late_ms;
-            tell(&mut world, told);
-        }
-        world.send(places.autopilot, AUTOPILOT, &set_pitchyaw(NAN, NAN, 0.0, 0.1, 44));
-        for _ in 0..10 {
-            let told = boot_ms(&world);
-            tell(&mut world, told);
-        }
-        assert_eq!(in_control(&mut world, places), (AUTOPILOT, NOBODY), "{late_ms} ms");
-        let setpoint = world.snapshot().gimbals[0].setpoint.clone();
-        assert_eq!(setpoint.map(|it| it.mode), Some("rate".to_owned()), "it goes on to turn");
-
-        tell(&mut world, 200);
-        assert_eq!(in_control(&mut world, places), (GCS, NOBODY), "{late_ms} ms");
-    }
-}
-
     world.send(places.ground, SCRIPT, &heartbeat(0, 8));
     world.send(places.ground, TABLET, &heartbeat(6, 8));
     world.forget();
