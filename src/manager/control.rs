@@ -268,6 +268,10 @@ impl Control {
             Claim::Take => Some(sender),
             Claim::Assign(id) => Some(id),
         };
+        if to.is_some_and(|id| id.system == 0 || id.component == 0) {
+            // 281 could not name it.
+            return Err(Refusal::denied("id_of_nobody"));
+        }
         let borrows = place == Place::Primary && is_autopilot && to == Some(sender);
         let is_of_another = from.is_some_and(|holder| holder != sender && Some(holder) != to);
         if let Some(holder) = from.filter(|_| is_of_another) {

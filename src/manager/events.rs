@@ -292,6 +292,7 @@ fn explain(reason: &str) -> String {
         "other_vehicle" => "it belongs to another vehicle",
         UNCONFIRMED => "it is dangerous, and its word was not said",
         "only_for_the_holder" => "only who has control may ask for that",
+        "id_of_nobody" => "its system or component id is 0, which is nobody's; for control it needs ids of its own",
         "half_a_pair" => "it named half of a system and component id",
         "not_an_id" => "it named something that is no id",
         "unknown_gimbal" => "it named a gimbal that is not here",

@@ -6,11 +6,11 @@ use gimbald::bridge::settings::Settings;
 use gimbald::gimbals::settings::{GimbalSettings, Takeover};
 use gimbald::manager::settings::ControlSettings;
 use gimbald::wire::MavId;
-use gimbald::wire::dialect::{ATTITUDE_DATA, MavMessage};
+use gimbald::wire::dialect::{ATTITUDE_DATA, COMMAND_ACK_DATA, MavMessage};
 
 use super::{COMPANION, SECOND, only_setpoint, run_looking, setpoints, told_control, with_gimbal_that};
 use crate::support::script::{
-    ACCEPTED, DENIED, NAN, configure, device_status, ids, pitch_yaw_deg, pitchyaw, px4_heartbeat, set_pitchyaw,
+    ACCEPTED, DENIED, NAN, configure, device_status, ids, of, pitch_yaw_deg, pitchyaw, px4_heartbeat, set_pitchyaw,
     take_control, usual_capabilities,
 };
 use crate::support::world::{AUTOPILOT, GCS, GIMBAL, Place, Places, World, heartbeat, three_links};
@@ -129,6 +129,32 @@ fn who_may_take_control_may_get_in_beside_the_holder() {
         let claim = configure([-1.0, -1.0], [-2.0, -2.0]);
         assert_eq!(world.result_of(at(places, taker), taker, &claim), Some(ACCEPTED), "{policy:?}: {taker}");
         assert_eq!(in_control(&mut world, places), (holder, taker));
+    }
+}
+
+/// 281: "0 = none". A component with a 0 in its ids, as pymavlink's scripts have by default, is nobody whom 281 could name:
+/// it is denied control, and everybody else goes on to have a say. It steers what nobody holds, as anybody does (D3).
+#[test]
+fn who_has_no_ids_of_its_own_gets_no_control() {
+    for nobody in [MavId::new(255, 0), MavId::new(0, 190), MavId::new(0, 0)] {
+        let (mut world, places) = under(Takeover::Open);
+        for places_claimed in [([-2.0, -2.0], [-1.0, -1.0]), ([-1.0, -1.0], [-2.0, -2.0])] {
+            let claim = configure(places_claimed.0, places_claimed.1);
+            let answers = world.ask(places.ground, nobody, &claim);
+            let acks: Vec<_> = of::<COMMAND_ACK_DATA>(&answers);
+            assert_eq!(acks.iter().map(|ack| ack.result).collect::<Vec<_>>(), [DENIED], "{nobody}: {claim:?}");
+        }
+        assert_eq!(in_control(&mut world, places), (NOBODY, NOBODY), "{nobody}");
+        let gimbal = &world.snapshot().gimbals[0];
+        assert_eq!((&gimbal.primary, &gimbal.secondary), (&None, &None), "{nobody}");
+        assert_eq!(gimbal.rejected[&nobody.to_string()]["id_of_nobody"], 2);
+
+        world.send(places.ground, nobody, &pitchyaw(-20.0, 0.0, NAN, NAN, 44.0));
+        assert_eq!(world.snapshot().gimbals[0].setpoint.as_ref().and_then(|it| it.pitch_deg), Some(-20.0), "{nobody}");
+        assert_eq!(world.result_of(places.ground, GCS, &take_control()), Some(ACCEPTED));
+        assert_eq!(world.result_of(places.ground, GCS, &pitchyaw(-10.0, 0.0, NAN, NAN, 44.0)), Some(ACCEPTED));
+        world.send(places.ground, nobody, &pitchyaw(-20.0, 0.0, NAN, NAN, 44.0));
+        assert_eq!(world.snapshot().gimbals[0].setpoint.as_ref().and_then(|it| it.pitch_deg), Some(-10.0), "{nobody}");
     }
 }
 
