@@ -201,14 +201,14 @@ fn a_gremsy_is_restarted_and_shut_down() {
         done(&mut world, "turn", None, r#"{"yaw_dps": 10}"#);
         world.run_for(SECOND / 2);
         done(&mut world, "reboot", None, r#"{"confirm": "reboot"}"#);
+        world.forget();
         world.run_for(40 * SECOND);
         assert_eq!(world.snapshot().gimbals[0].state, "alive", "{generation:?}");
         assert_eq!(details(&world, "/stage"), "running", "{generation:?}");
         let before = looks(&world);
-        world.forget();
         world.run_for(5 * SECOND);
         assert_eq!(looks(&world), before, "{generation:?}: it stands");
-        assert_eq!(orders(&mut world, places), (vec![], 0), "{generation:?}: it is told nothing");
+        assert_eq!(orders(&mut world, places), (vec![], 0), "{generation:?}: it is told nothing after that");
 
         take(&mut world);
         done(&mut world, "shutdown", None, r#"{"confirm": "shutdown"}"#);
