@@ -1,14 +1,14 @@
 //! From what was asked to what the device can do.
 
-use super::setpoint::{Pointing, Setpoint, Stabilised};
+use super::setpoint::{Pointing, Setpoint, Stabilised, Turning};
 use crate::geometry::{Angle, Limits, Yaw, YawFrame};
 use crate::wire::ids::CapFlags;
 
 /// `setpoint` with its yaw in `frame` and its angles within `limits`.
 ///
 /// `heading` turns one frame into the other; `None` when it is needed and not known. `yaw_now` is where the gimbal
-/// looks in the vehicle frame, from which the way round its end stops is chosen. A rotation about North cannot be
-/// expressed in the vehicle frame and is handed back as it is.
+/// looks in the vehicle frame, from which the way round its end stops is chosen. A rotation cannot be expressed in another
+/// frame: there it is none, so that what the device turned at in its former frame ends.
 pub fn to_device(
     setpoint: Setpoint,
     frame: YawFrame,
@@ -28,6 +28,9 @@ pub fn to_device(
                 yaw,
                 ..pointing
             }))
+        }
+        Setpoint::Turn(turning) if turning.yaw_frame != frame => {
+            Some(Setpoint::Turn(Turning { yaw_frame: frame, ..turning.stopped() }))
         }
         Setpoint::Retract | Setpoint::Neutral | Setpoint::Turn(_) => Some(setpoint),
     }

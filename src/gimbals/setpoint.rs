@@ -79,6 +79,16 @@ impl Turning {
     }
 }
 
+impl Setpoint {
+    /// What of it can be told while nothing newer is known: an angle as it is, a rotation as none.
+    pub fn at_rest(self) -> Self {
+        match self {
+            Self::Turn(turning) => Self::Turn(turning.stopped()),
+            Self::Point(_) | Self::Retract | Self::Neutral => self,
+        }
+    }
+}
+
 impl RadioControl {
     pub fn of_flags(flags: GimbalFlags) -> Self {
         if flags.contains(GimbalFlags::RC_EXCLUSIVE) {

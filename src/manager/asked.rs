@@ -286,7 +286,7 @@ impl GimbalManager {
         let pause = self.pauses.swap_remove(at);
         match (answer.is_ok(), pause.hands_over) {
             (true, true) => self.tracking.leave_to_radio_control(),
-            (true, false) => self.tracking.forget(),
+            (true, false) => self.tracking.leave_to_itself(),
             (false, _) => {}
         }
         self.note_operated(now);

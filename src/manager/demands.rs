@@ -24,6 +24,11 @@ impl GimbalManager {
         if demand.is_stop() && !nudges && self.stop_unsteerable(now) {
             return Ok(());
         }
+        // Nothing that was told turns while the gimbal does something by a function of its own.
+        if demand.is_without_motion() && !nudges && !self.pauses.is_empty() {
+            self.note_obeyed(now, sender);
+            return Ok(());
+        }
         let capabilities = match self.capabilities.filter(|_| nudges && demand.is_stop()) {
             Some(capabilities) => capabilities,
             None => *self.steerable()?,
@@ -37,8 +42,11 @@ impl GimbalManager {
         if nudges {
             return self.tracking.nudge(now, sender, &demand, &situation, timeouts);
         }
-        self.tracking.demand(now, sender, &demand, &situation, timeouts)?;
-        self.note_demand(now, sender);
+        if self.tracking.demand(now, sender, &demand, &situation, timeouts)? {
+            self.note_demand(now, sender);
+        } else {
+            self.note_obeyed(now, sender);
+        }
         Ok(())
     }
 }

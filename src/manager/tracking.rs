@@ -59,6 +59,8 @@ pub struct Tracking {
     let_go: Option<Timestamp>,
     /// It was left to its radio control until the next demand, by something else than a demand.
     left_to_radio_control: bool,
+    /// It does something by a function of its own, until the next demand.
+    left_to_itself: bool,
 }
 
 impl Tracking {
@@ -78,10 +80,11 @@ impl Tracking {
             stale: false,
             let_go: None,
             left_to_radio_control: false,
+            left_to_itself: false,
         }
     }
 
-    /// Takes a demand that passed the gate.
+    /// Takes a demand that passed the gate; false where it changes nothing.
     pub fn demand(
         &mut self,
         now: Timestamp,
@@ -89,14 +92,14 @@ impl Tracking {
         demand: &Demand,
         situation: &Situation<'_>,
         timeouts: RateTimeouts,
-    ) -> Result<(), Refusal> {
+    ) -> Result<bool, Refusal> {
         self.carry_on(now, situation);
-        let Some(aim) = self.read_demand(now, demand, situation, timeouts)? else { return Ok(()) };
+        let Some(aim) = self.read_demand(now, demand, situation, timeouts)? else { return Ok(false) };
         self.change_hands(now, &aim, situation)?;
         self.begin(now, source, aim);
         let whole = matches!(aim, Aim::Retract | Aim::Neutral);
         self.nudge.handle_absolute(now, whole || demand.pitch.angle.is_some(), whole || demand.yaw.angle.is_some());
-        Ok(())
+        Ok(true)
     }
 
     /// Whether a demand could be carried out.
@@ -232,8 +235,14 @@ impl Tracking {
         self.last = None;
         self.stale = false;
         self.let_go = None;
-        self.left_to_radio_control = false;
+        (self.left_to_radio_control, self.left_to_itself) = (false, false);
         self.nudge = Nudge::default();
+    }
+
+    /// The gimbal does what it was asked by name, until somebody demands something.
+    pub fn leave_to_itself(&mut self) {
+        self.forget();
+        self.left_to_itself = true;
     }
 
     /// More is known of how the vehicle is turned: where the setpoint follows it, the next one is due unless one has just
@@ -263,7 +272,7 @@ impl Tracking {
         let wanted = self.setpoint(situation).map(|wanted| self.nudge.added_to(wanted, situation));
         let wanted = wanted.and_then(|wanted| self.for_device(wanted, situation));
         self.note_stale(wanted.is_none() || self.has_lost_the_vehicle(situation));
-        self.last = wanted.or(self.last);
+        self.last = wanted.or(self.last.map(Setpoint::at_rest));
         self.last_at = now;
         self.last_heading = situation.heading;
         self.next = (self.aim != Aim::Idle).then(|| now + self.period);
@@ -325,7 +334,7 @@ impl Tracking {
 
     fn begin(&mut self, now: Timestamp, source: MavId, aim: Aim) {
         self.aim = aim;
-        self.left_to_radio_control = false;
+        (self.left_to_radio_control, self.left_to_itself) = (false, false);
         self.source = Some(source);
         self.carried_to = now;
         self.next = Some(now);
@@ -363,10 +372,16 @@ impl Tracking {
                 let straight = |from, to| to - from;
                 let frame = point.frame;
                 let way = |from, to| way(from, to, frame, situation);
+                // What it cannot be told it does not do meanwhile, and would do all at once later.
+                let can_be_told = situation.device_frame(frame) == frame || situation.heading.is_some();
+                let passed = if can_be_told { passed } else { Duration::ZERO };
+                let measured = unnudged(frame);
+                let [roll, pitch, yaw] =
+                    [measured.map(|pose| pose.roll), measured.map(|pose| pose.pitch), measured.map(|pose| pose.yaw)];
                 let timed_out = [
-                    point.roll.carry_on(now, passed, straight, |angle| limits.clamp_roll(angle)),
-                    point.pitch.carry_on(now, passed, straight, |angle| limits.clamp_pitch(angle)),
-                    point.yaw.carry_on(now, passed, way, |angle| clamp_yaw(angle, frame, situation)),
+                    point.roll.carry_on(now, passed, roll, straight, |angle| limits.clamp_roll(angle)),
+                    point.pitch.carry_on(now, passed, pitch, straight, |angle| limits.clamp_pitch(angle)),
+                    point.yaw.carry_on(now, passed, yaw, way, |angle| clamp_yaw(angle, frame, situation)),
                 ];
                 if timed_out.contains(&true) {
                     self.timed_out = self.source;

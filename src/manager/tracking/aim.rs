@@ -39,8 +39,8 @@ impl Aim {
             Self::Point(point) => {
                 let mut stopped = false;
                 for axis in [&mut point.roll, &mut point.pitch, &mut point.yaw] {
-                    if matches!(axis.motion, Motion::Turning { .. }) {
-                        axis.motion = Motion::Still;
+                    if let Motion::Turning { rate, .. } = axis.motion {
+                        axis.motion = Motion::Stopping { rate };
                         stopped = true;
                     }
                 }

@@ -48,7 +48,18 @@ pub(super) enum Motion {
         rate: AngularRate,
         until: Option<Timestamp>,
     },
+    /// A rotation at that rate has ended.
+    Stopping {
+        rate: AngularRate,
+    },
 }
+
+/// The angle that turns is so far ahead of the gimbal at most as it turns in that time: a gimbal slower than asked would go on
+/// to it for as long as it was told to turn, …
+const LEADS_BY: Duration = Duration::from_secs(1);
+
+/// … and so far when the rotation has ended. "On expiry the rate falls to zero within 0.2 s, then the attitude is held" (D7).
+const ENDS_WITHIN: Duration = Duration::from_millis(200);
 
 impl Turn {
     /// The same rotation as angles that move, from where the gimbal is.
@@ -113,12 +124,13 @@ impl Axis {
         Self { at, motion: Motion::Still }
     }
 
-    /// Moves by the time that has `passed`; `way` leads from one angle to another, `clamp` keeps off the end stops. True when a rate
-    /// has just ended by itself.
+    /// Moves by the time that has `passed`; the gimbal looks along `measured`, `way` leads from one angle to another, `clamp`
+    /// keeps off the end stops. True when a rate has just ended by itself.
     pub(super) fn carry_on(
         &mut self,
         now: Timestamp,
         passed: Duration,
+        measured: Option<Angle>,
         way: impl Fn(Angle, Angle) -> Angle,
         clamp: impl Fn(Angle) -> Angle,
     ) -> bool {
@@ -136,12 +148,31 @@ impl Axis {
             Motion::Turning { rate, until } => {
                 self.at = clamp(self.at + rate.over(passed));
                 if until.is_some_and(|until| until <= now) {
-                    self.motion = Motion::Still;
+                    self.stop(rate, measured);
                     return true;
                 }
+                self.lead(rate, measured, LEADS_BY);
             }
+            Motion::Stopping { rate } => self.stop(rate, measured),
         }
         false
+    }
+}
+
+impl Axis {
+    fn stop(&mut self, rate: AngularRate, measured: Option<Angle>) {
+        self.lead(rate, measured, ENDS_WITHIN);
+        self.motion = Motion::Still;
+    }
+
+    /// No further ahead of `measured` than `rate` leads in that time.
+    fn lead(&mut self, rate: AngularRate, measured: Option<Angle>, time: Duration) {
+        let Some(measured) = measured.filter(|_| !rate.is_zero()) else { return };
+        let (ahead, most) = ((self.at - measured).wrapped(), rate.over(time));
+        let too_far = if most > Angle::ZERO { ahead > most } else { ahead < most };
+        if too_far {
+            self.at -= ahead - most;
+        }
     }
 }
 

@@ -256,10 +256,13 @@ impl Demand {
 
     /// Whether it is to turn no more, and nothing else.
     pub fn is_stop(&self) -> bool {
+        self.kind != DemandKind::Manual && self.is_without_motion()
+    }
+
+    /// The same, or what a stick at rest sends.
+    pub fn is_without_motion(&self) -> bool {
         let is_still = |rate: AngularRate| rate.is_zero();
-        self.kind != DemandKind::Manual
-            && self.is_rates_only()
-            && [self.roll, self.pitch, self.yaw].iter().all(|axis| axis.rate.is_none_or(is_still))
+        self.is_rates_only() && [self.roll, self.pitch, self.yaw].iter().all(|axis| axis.rate.is_none_or(is_still))
     }
 }
 

@@ -1,8 +1,9 @@
 //! From a demand to an aim: which frame it is in, which axes it leaves out, what the gimbal can do.
 //!
 //! A demand of zero rates and no angles stops what moves: a rotation, an angle approached at a rate, a region of interest.
-//! It ends no angle, no neutral and no retract, however long ago they were asked for: some clients stream zero rates
-//! while nobody touches the stick, and a last one often arrives behind the command that was meant to follow it.
+//! It ends no angle, no neutral and no retract, however long ago they were asked for, nothing that the gimbal does by a function
+//! of its own, and takes it from no radio control: some clients stream zero rates while nobody touches the stick, and
+//! a last one often arrives behind the command that was meant to follow it.
 
 use super::motion::{Axis, Motion, Point, Turn, clamp_yaw};
 use super::situation::{Pose, Situation};
@@ -65,16 +66,17 @@ impl Tracking {
             hold = situation.device_frame(hold);
         }
         let reference = self.reference(hold, situation);
+        let radio_control = RadioControl::of_flags(flags);
         let stands = match &self.aim {
             Aim::Retract | Aim::Neutral => true,
             Aim::Turn(turn) => turn.turning.is_zero() && turn.turning.yaw_frame == hold,
             Aim::Point(point) => !point.moves() && reference.is_none(),
-            Aim::Idle | Aim::Roi(_) => false,
+            Aim::Idle => self.left_to_itself,
+            Aim::Roi(_) => false,
         };
-        if stops && stands {
+        if stops && (stands || self.is_handed_over() && radio_control != RadioControl::Exclusive) {
             return Ok(None);
         }
-        let radio_control = RadioControl::of_flags(flags);
         let stops_angles = stops && matches!(self.aim, Aim::Point(_)) && reference.is_some();
         let keeps_angles = stops_angles || radio_control == RadioControl::Exclusive;
         if by_rates && !keeps_angles && capabilities.turns && situation.device_frame(hold) == hold {
@@ -119,7 +121,8 @@ impl Tracking {
         // An axis left out goes on to its angle, and turns no further: rates are replaced on all axes at once (D7).
         let keep = |axis: Axis| match axis.motion {
             Motion::Slew { .. } if !by_rates => axis,
-            Motion::Still | Motion::Slew { .. } | Motion::Turning { .. } => Axis::still(axis.at),
+            Motion::Turning { rate, .. } => Axis { at: axis.at, motion: Motion::Stopping { rate } },
+            Motion::Still | Motion::Slew { .. } | Motion::Stopping { .. } => Axis::still(axis.at),
         };
         let axis = |wanted: AxisDemand, angle: Option<Angle>, reference: Option<Axis>, measured: Option<Angle>| match (
             angle,
@@ -166,7 +169,10 @@ impl Tracking {
     /// What an axis without a demand keeps: its setpoint where it has one, else where the gimbal is.
     pub(super) fn reference(&self, frame: YawFrame, situation: &Situation<'_>) -> Option<Point> {
         let stabilised = Stabilised::BOTH;
-        if let Aim::Point(point) = self.aim {
+        // What it was told before its radio control had it is none of its angles any more.
+        if let Aim::Point(point) = self.aim
+            && point.radio_control != RadioControl::Exclusive
+        {
             if point.frame == frame {
                 return Some(point);
             }

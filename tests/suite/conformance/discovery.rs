@@ -353,9 +353,9 @@ fn item_36_a_calibrating_gimbal_is_stopped() {
         assert!(zeros.len() >= 3 && zeros.iter().all(|rates| *rates == [0.0, 0.0]), "{zeros:?}");
         assert_eq!(world.snapshot().gimbals[0].setpoint, None);
 
-        // It rests for a second by its rates, and is kept where it then looks.
+        // It comes to rest by its rates, and is kept where it then looks.
         report_failure(&mut world, places, 0);
-        world.run_for(SECOND / 2);
+        world.run_for(SECOND / 4);
         let zeros = told(&mut world, places);
         assert!(!zeros.is_empty() && zeros.iter().all(|rates| *rates == [0.0, 0.0]), "{zeros:?}");
     }

@@ -16,13 +16,13 @@ use gimbald::manager::asked::NotDone;
 use gimbald::wire::MavId;
 use gimbald::wire::dialect::{
     COMMAND_LONG_DATA, CharArray, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA,
-    MOUNT_ORIENTATION_DATA, MavMessage, PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA, PARAM_SET_DATA,
-    PARAM_VALUE_DATA,
+    GIMBAL_MANAGER_SET_PITCHYAW_DATA, MOUNT_ORIENTATION_DATA, MavMessage, PARAM_REQUEST_LIST_DATA,
+    PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA,
 };
 
 use crate::support::script::{
     ACCEPTED, DENIED, NAN, UNSUPPORTED, ack, autopilot_state, command_long, device_information, device_status,
-    gimbal_heartbeat, ground_heartbeat, of, pitch_yaw_deg, px4_heartbeat, quaternion, usual_capabilities,
+    gimbal_heartbeat, ground_heartbeat, of, pitch_yaw_deg, px4_heartbeat, quaternion, set_pitchyaw, usual_capabilities,
 };
 use crate::support::world::{AUTOPILOT, GCS, GIMBAL, MANAGER, Places, World, heartbeat, three_links};
 
@@ -164,11 +164,17 @@ fn a_yaw_that_we_hold_to_north_is_shown_as_held() {
 #[test]
 fn statement_37_a_rate_becomes_angles_that_move_and_end() {
     let (mut world, places) = with_gimbal(GimbalSettings { setpoint_rate_hz: 50, ..v1_gimbal() });
-    let keep = |world: &mut World, duration: Duration| {
+    // It follows, and says so ten times a second.
+    let mut looks = -20.0;
+    let mut keep = |world: &mut World, duration: Duration| -> Vec<[f32; 4]> {
+        let mut all = Vec::new();
         for _ in 0..(duration.as_millis() / 100) {
-            report(world, places, -20.0, 0.0);
+            report(world, places, looks, 0.0);
             world.run_for(SECOND / 10);
+            all.extend(told(world, places));
+            looks = all.last().map_or(looks, |told| told[0]);
         }
+        all
     };
     report(&mut world, places, -20.0, 0.0);
     let turn = gimbald::wire::dialect::GIMBAL_MANAGER_SET_PITCHYAW_DATA {
@@ -182,31 +188,119 @@ fn statement_37_a_rate_becomes_angles_that_move_and_end() {
         gimbal_device_id: 1,
     };
     world.send(places.ground, GCS, &MavMessage::GIMBAL_MANAGER_SET_PITCHYAW(turn.clone()));
-    keep(&mut world, SECOND);
-    let moved = told(&mut world, places);
+    let moved = keep(&mut world, SECOND);
     assert!((49..=51).contains(&moved.len()), "{}", moved.len());
     for pair in moved.windows(2) {
         assert!((pair[1][0] - pair[0][0] + 0.2).abs() < 1e-3, "a fiftieth of 10 degrees: {pair:?}");
     }
-    keep(&mut world, 2 * SECOND);
-    let ended = told(&mut world, places);
+    let ended = keep(&mut world, 2 * SECOND);
     assert_near(ended[ended.len() - 1], [-40.0, 0.0, 0.0, 2.0]);
     assert_eq!(ended[ended.len() - 2], ended[ended.len() - 1], "two seconds after the last it stands");
 
     // To the end of its reach, and not beyond.
     let down = command_long(MANAGER, 1000, &[NAN, NAN, -60.0, 0.0, 44.0, 0.0, 1.0]);
     assert_eq!(world.result_of(places.ground, GCS, &down), Some(ACCEPTED));
-    keep(&mut world, 3 * SECOND);
-    let down = told(&mut world, places);
+    let down = keep(&mut world, 3 * SECOND);
     assert!(down.iter().all(|told| told[0] >= -90.0));
     assert_near(down[down.len() - 1], [-90.0, 0.0, 0.0, 2.0]);
 
     // And back from there at once, whatever it was asked for beyond.
     let up = command_long(MANAGER, 1000, &[NAN, NAN, 20.0, 0.0, 44.0, 0.0, 1.0]);
     assert_eq!(world.result_of(places.ground, GCS, &up), Some(ACCEPTED));
-    keep(&mut world, SECOND / 2);
-    let up = told(&mut world, places);
+    let up = keep(&mut world, SECOND / 2);
     assert!((-81.0..=-79.0).contains(&up[up.len() - 1][0]), "{up:?}");
+}
+
+/// D9: "no change of … link state moves the camera by itself": while the heading is not known, a rate about North that cannot be told
+/// turns nothing, and is not made up for when it is known again.
+#[test]
+fn a_rate_that_cannot_be_told_is_not_made_up_for() {
+    let (mut world, places) = with_gimbal(v1_gimbal());
+    let fly = |world: &mut World, duration: Duration, is_known: bool| -> Vec<[f32; 4]> {
+        let mut all = Vec::new();
+        for _ in 0..(duration.as_millis() / 100) {
+            if is_known {
+                turn_vehicle(world, places, 0.0);
+            }
+            let yaw = all.last().map_or(0.0, |told: &[f32; 4]| told[2]);
+            report(world, places, 0.0, yaw);
+            world.run_for(SECOND / 10);
+            all.extend(told(world, places));
+        }
+        all
+    };
+    fly(&mut world, SECOND, true);
+    let turn = command_long(MANAGER, 1000, &[NAN, NAN, 0.0, 20.0, 92.0, 0.0, 1.0]);
+    assert_eq!(world.result_of(places.ground, GCS, &turn), Some(ACCEPTED));
+    let turned = fly(&mut world, SECOND, true);
+    assert!((turned.last().expect("it turns")[2] - 20.0).abs() < 3.0, "{turned:?}");
+
+    let unknown = fly(&mut world, 15 * SECOND, false);
+    let again = fly(&mut world, 3 * SECOND, true);
+
+    let held = unknown.last().expect("the last is held")[2];
+    assert!((20.0..45.0).contains(&held), "it is noticed after a second that it cannot be told: {unknown:?}");
+    assert!(again.len() >= 3 && again.iter().all(|told| (told[2] - held).abs() < 0.1), "{held} {again:?}");
+}
+
+/// D7: "On expiry the rate falls to zero within 0.2 s, then the attitude is held", also where the gimbal is slower than what it is
+/// asked for: the angles that it is told do not run away from it, and it does not go on to them when its operator lets go.
+#[test]
+fn a_gimbal_slower_than_its_rate_stands_when_the_rate_ends() {
+    for ends in ["zero", "release", "time-out"] {
+        let configure = |ids: f32| command_long(MANAGER, 1001, &[ids, ids, -1.0, -1.0, 0.0, 0.0, 1.0]);
+        let (mut world, places) = with_gimbal(v1_gimbal());
+        report(&mut world, places, -20.0, 0.0);
+        assert_eq!(world.result_of(places.ground, GCS, &configure(-2.0)), Some(ACCEPTED), "{ends}");
+        let turn = |rate: f32| match set_pitchyaw(NAN, NAN, 0.0, rate.to_radians(), 44) {
+            MavMessage::GIMBAL_MANAGER_SET_PITCHYAW(turn) => {
+                MavMessage::GIMBAL_MANAGER_SET_PITCHYAW(GIMBAL_MANAGER_SET_PITCHYAW_DATA {
+                    gimbal_device_id: 1,
+                    ..turn
+                })
+            }
+            other => other,
+        };
+        let (mut yaw, mut latest) = (0.0, 0.0);
+        // It turns by 8 degrees per second at most, and is asked for 25.
+        let mut step = |world: &mut World, asked: Option<f32>| -> f32 {
+            if let Some(rate) = asked {
+                world.send(places.ground, GCS, &turn(rate));
+            }
+            report(world, places, -20.0, yaw);
+            world.run_for(SECOND / 10);
+            latest = told(world, places).last().map_or(latest, |told| told[2]);
+            yaw += (latest - yaw).clamp(-0.8, 0.8);
+            latest
+        };
+        for _ in 0..50 {
+            let told = step(&mut world, Some(25.0));
+            assert!(told <= 8.0 * 5.0 + 25.0 + 0.1, "{ends}: {told}");
+        }
+        let more = match ends {
+            "zero" => usize::from(step(&mut world, Some(0.0)) < 0.0),
+            "release" => {
+                assert_eq!(world.result_of(places.ground, GCS, &configure(-3.0)), Some(ACCEPTED));
+                0
+            }
+            // Two seconds after it was last asked for.
+            _ => 20,
+        };
+        for _ in 0..more {
+            step(&mut world, None);
+        }
+        step(&mut world, None);
+        let at_end = step(&mut world, None);
+        for _ in 0..100 {
+            step(&mut world, None);
+        }
+        let last = step(&mut world, None);
+        assert!((last - at_end).abs() < 0.01, "{ends}: {at_end} to {last}");
+        let looks = world.snapshot().gimbals[0].attitude.yaw_vehicle_deg.expect("it says so");
+        assert!((looks - f64::from(last)).abs() < 0.5, "{ends}: {looks}");
+        let before = 40.0 + 0.8 * more as f64;
+        assert!(looks < before + 8.0, "{ends}: it looks to {looks}");
+    }
 }
 
 /// Gimbal statement 48: "… the daemon's client code supplies both angles": a client that names one axis has the other

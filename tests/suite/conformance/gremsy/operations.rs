@@ -12,6 +12,7 @@ use gimbald::manager::asked::NotDone;
 use gimbald::wire::dialect::{COMMAND_ACK_DATA, MavMessage, PARAM_REQUEST_LIST_DATA};
 
 use super::*;
+use crate::support::script::{NAN, set_pitchyaw};
 use crate::support::world::GIMBAL;
 
 fn controlled(generation: Generation) -> (World, Places) {
@@ -510,4 +511,24 @@ fn turn_to(world: &mut World, yaw: f64) {
     let asked = Asked::Point { roll, pitch, yaw, yaw_frame: YawFrame::Vehicle };
     let id = world.ask_by_name("camera", &asked);
     assert_eq!(world.answers.last(), Some(&(id, Ok(()))));
+}
+
+/// "Some clients stream zero rates while nobody touches the stick": that ends nothing that the gimbal does by a function of its
+/// own, neither while it is asked for nor while it is on its way.
+#[test]
+fn a_stick_at_rest_undoes_no_function_of_its_own() {
+    for generation in [Generation::V1, Generation::V2] {
+        for (reset, expected) in [(ResetMode::PitchAndYaw, (0.0, 0.0)), (ResetMode::Yaw, (-40.0, 0.0))] {
+            let (mut world, places) = running(generation);
+            point(&mut world, -40.0, 60.0);
+            run(&mut world, places, 6 * SECOND);
+            let asked = Asked::Operation(Operation::Reset(reset));
+            let id = world.ask_by_name("camera", &asked);
+            let zeros = set_pitchyaw(NAN, NAN, 0.0, 0.0, 44);
+            let beat = (SECOND, places.ground, GCS, ground_heartbeat());
+            world.run_with(8 * SECOND, &[beat, (SECOND / 10, places.ground, GCS, zeros)]);
+            assert!(world.answers.contains(&(id, Ok(()))), "{generation:?} {reset:?} {:?}", world.answers);
+            assert_looks(&world, expected.0, expected.1);
+        }
+    }
 }

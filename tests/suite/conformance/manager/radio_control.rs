@@ -5,8 +5,8 @@ use gimbald::wire::ids::CapFlags;
 
 use super::{COMPANION, FIELD, SECOND, assert_near, fly, only_setpoint, setpoints, with_gimbal, with_gimbal_that};
 use crate::support::script::{
-    ACCEPTED, DENIED, NAN, TEMPORARILY_REJECTED, device_status, pitch_yaw_deg, pitchyaw, roi_location, set_pitchyaw,
-    usual_capabilities,
+    ACCEPTED, DENIED, NAN, TEMPORARILY_REJECTED, device_status, pitch_yaw_deg, pitchyaw, roi_location,
+    set_manual_control, set_pitchyaw, usual_capabilities,
 };
 use crate::support::world::{GCS, GIMBAL, Places, World, three_links};
 
@@ -124,6 +124,44 @@ fn a_rotation_that_radio_control_took_over_is_stopped_when_it_lets_go() {
     assert!(!stops.is_empty() && stops.iter().all(|(_, setpoint)| rates(setpoint)[1..] == [0.0, 0.0]), "{stops:?}");
     assert!(stops.last().map(|told| told.0) < held.first().map(|told| told.0), "it is held where it came to rest");
     assert!(!held.is_empty());
+}
+
+/// D9: "axes it leaves out, and the start of every ramp, are the measured attitude": where the pilot has turned it, and not
+/// where it looked before he had it. Zeros of a stick at rest do not take it from him.
+#[test]
+fn what_takes_it_back_begins_where_the_pilot_left_it() {
+    // Pitch and yaw asked for, and what it is told of both then.
+    for (message, expected) in [
+        (pitchyaw(NAN, NAN, 0.0, 0.0, 44.0), None),
+        (set_pitchyaw(NAN, NAN, 0.0, 0.0, 44), None),
+        (set_manual_control(NAN, NAN, 0.0, 0.0), None),
+        (pitchyaw(NAN, -40.0, NAN, NAN, 44.0), Some((0.0, -40.0))),
+        (pitchyaw(-50.0, NAN, NAN, NAN, 44.0), Some((-50.0, 10.0))),
+    ] {
+        let (mut world, places) = with_inputs();
+        report(&mut world, places, 0, 10.0);
+        assert_eq!(world.result_of(places.ground, GCS, &pitchyaw(-20.0, 30.0, NAN, NAN, 44.0)), Some(ACCEPTED));
+        let hand_over = pitchyaw(NAN, NAN, NAN, NAN, 44.0 + 256.0);
+        assert_eq!(world.result_of(places.ground, GCS, &hand_over), Some(ACCEPTED));
+        run_with(&mut world, places, SECOND, EXCLUSIVE);
+        world.forget();
+
+        world.send(places.ground, GCS, &message);
+
+        let told = setpoints(&mut world, places);
+        let looks = told.last().map(|(_, setpoint)| pitch_yaw_deg(setpoint.q));
+        match (looks, expected) {
+            (None, None) => {
+                run_with(&mut world, places, SECOND, EXCLUSIVE);
+                assert_eq!(setpoints(&mut world, places), [], "{message:?}");
+            }
+            (Some((pitch, yaw)), Some(wanted)) => {
+                assert_near(pitch, wanted.0, 0.001);
+                assert_near(yaw, wanted.1, 0.001);
+            }
+            other => panic!("{message:?}: {other:?}"),
+        }
+    }
 }
 
 /// `RC_MIXED` goes with each setpoint; what the gimbal makes of it is its business.

@@ -329,3 +329,36 @@ fn client_item_e101_an_angle_ends_a_stream_of_rates() {
 fn turns(setpoint: &Setpoint) -> [f32; 2] {
     [setpoint.angular_velocity_y, setpoint.angular_velocity_z]
 }
+
+/// "To stop takes no heading": a device that took a rate about North, and says no more that it takes yaw from there, is told its
+/// zeros in the frame that it takes.
+#[test]
+fn a_rotation_about_north_is_stopped_in_the_frame_that_the_device_takes_then() {
+    let (mut world, places) = with_gimbal();
+    let says = |world: &mut World, flags: u16, duration: Duration| {
+        let end = world.now + duration;
+        while world.now < end {
+            let status = device_status(world.now, flags, 0.0, 10.0);
+            world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status));
+            world.run_for(SECOND / 10);
+        }
+    };
+    says(&mut world, 12 | 64 | 16 | 128, SECOND / 2);
+    world.send(places.ground, GCS, &set_pitchyaw(NAN, NAN, 0.0, 0.1, 92));
+    says(&mut world, 12 | 64 | 16 | 128, SECOND / 2);
+    let told = setpoints(&mut world, places);
+    assert!(
+        !told.is_empty() && told.iter().all(|(_, told)| (told.flags, told.angular_velocity_z) == (92, 0.1)),
+        "{told:?}"
+    );
+
+    // It has lost its heading, and nobody else tells one.
+    says(&mut world, 44, 4 * SECOND);
+    let told = setpoints(&mut world, places);
+    assert!(told.len() >= 60, "{}", told.len());
+    assert!(told.iter().all(|(_, told)| told.flags == 44), "{told:?}");
+    assert!(
+        told.iter().all(|(_, told)| !told.q[0].is_nan() || told.angular_velocity_z == 0.0),
+        "it is told to turn in no other frame than it was asked for: {told:?}"
+    );
+}

@@ -403,3 +403,28 @@ fn direction(from: [f64; 3], to: [f64; 3]) -> Vector3<f64> {
     );
     Vector3::new(north, east, -up)
 }
+
+/// "A gimbal never keeps turning after its operator is gone": a place that gives no direction, as the vehicle is there itself,
+/// ends a rotation like any other demand, and what is told meanwhile is no rotation.
+#[test]
+fn a_place_without_a_direction_ends_a_rotation() {
+    for height in [0.0, 0.3] {
+        let (mut world, places) = with_gimbal();
+        fly(&mut world, places, FIELD, 0.0);
+        world.send(places.ground, GCS, &set_pitchyaw(NAN, NAN, 0.0, 0.1, 44));
+        run_flying(&mut world, places, SECOND / 2, FIELD, 0.0);
+        assert!(setpoints(&mut world, places).iter().all(|(_, setpoint)| setpoint.angular_velocity_z == 0.1));
+
+        let here = roi_location(0, [FIELD[0], FIELD[1]], FIELD[2] as f32 + height);
+        assert_eq!(world.result_of(places.ground, GCS, &here), Some(ACCEPTED));
+        run_flying(&mut world, places, 3 * SECOND, FIELD, 0.0);
+
+        let told = setpoints(&mut world, places);
+        assert!(told.len() >= 50, "{}", told.len());
+        assert!(
+            told.iter().all(|(_, setpoint)| [setpoint.angular_velocity_y, setpoint.angular_velocity_z] == [0.0, 0.0]),
+            "{told:?}"
+        );
+        assert_eq!(world.snapshot().gimbals[0].setpoint.as_ref().map(|it| it.mode.as_str()), Some("roi"));
+    }
+}

@@ -27,13 +27,15 @@ struct Flight {
     world: World,
     places: Places,
     demand: MavMessage,
+    /// Where the gimbal looks, pitch and yaw in degrees.
+    looks: (f64, f64),
 }
 
 impl Flight {
     /// The stream has been −30° from the beginning.
     fn new(settings: Settings) -> Self {
         let (world, places) = with_device(settings);
-        let mut flight = Self { world, places, demand: setpoint(-30.0, 0.0, 0) };
+        let mut flight = Self { world, places, demand: setpoint(-30.0, 0.0, 0), looks: (-5.0, 10.0) };
         flight.run(3 * SECOND);
         flight
     }
@@ -41,7 +43,8 @@ impl Flight {
     /// The autopilot goes on with what it demands.
     fn run(&mut self, duration: Duration) {
         let Places { autopilot, gimbal, ground } = self.places;
-        let status = MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(device_status(self.world.now, 44, -5.0, 10.0));
+        let status =
+            MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(device_status(self.world.now, 44, self.looks.0, self.looks.1));
         let state = MavMessage::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE(autopilot_state(self.world.now, AUTOPILOT, 90.0));
         self.world.run_with(
             duration,
@@ -54,6 +57,18 @@ impl Flight {
                 (PERIOD, autopilot, AUTOPILOT, self.demand.clone()),
             ],
         );
+    }
+
+    /// The same, and the gimbal goes where it is told; where that was at last.
+    fn follow(&mut self, duration: Duration) -> (f64, f64) {
+        for _ in 0..duration.as_millis() / 100 {
+            self.run(SECOND / 10);
+            let told: Vec<GIMBAL_DEVICE_SET_ATTITUDE_DATA> = self.world.take_messages(self.places.gimbal);
+            if let Some(told) = told.last() {
+                self.looks = pitch_yaw_deg(told.q);
+            }
+        }
+        self.looks
     }
 
     /// The autopilot demands something else, and goes on with that.
@@ -245,15 +260,12 @@ fn rates_end_with_the_stream() {
 fn a_rate_that_nobody_changes_ends() {
     let control = ControlSettings { command_rate_timeout: 10 * SECOND, ..ControlSettings::default() };
     let mut flight = Flight::new(Settings { control, ..presenting() });
-    flight.demand(turning(2.0, 0.0), 9 * SECOND);
+    flight.demand = turning(2.0, 0.0);
+    let before = flight.follow(9 * SECOND);
     assert_eq!(flight.world.snapshot().gimbals[0].setpoint.as_ref().map(|it| it.mode.clone()), Some("angle".into()));
-    let before = flight.told();
-    flight.run(SECOND);
-    assert_ne!(flight.told(), before, "it turns");
-    flight.run(3 * SECOND);
-    let after = flight.told();
-    flight.run(30 * SECOND);
-    assert_eq!(flight.told(), after, "it has stopped");
+    assert_ne!(flight.follow(SECOND), before, "it turns");
+    let after = flight.follow(3 * SECOND);
+    assert_eq!(flight.follow(30 * SECOND), after, "it has stopped");
 }
 
 /// "Unchanged" is a rate also when it is not exactly the same each time: what creeps asks for nothing new.
@@ -299,7 +311,7 @@ fn px4_drives_the_device_alike() {
         other => other,
     };
     let nothing = to_everybody(setpoint(0.0, 0.0, 0), 44, Some([NAN; 4]));
-    let mut flight = Flight { world, places, demand: nothing };
+    let mut flight = Flight { world, places, demand: nothing, looks: (-5.0, 10.0) };
     flight.run(5 * SECOND);
     assert_eq!(flight.told(), None);
 

@@ -48,7 +48,7 @@ fn a_demand_waits_for_the_gimbal_only_for_a_while() {
         introduce(&mut world, places, usual_capabilities());
         world.forget();
         stream(&mut world, -45.0, 1);
-        let mut flight = Flight { world, places, demand: gimbal_heartbeat() };
+        let mut flight = Flight { world, places, demand: gimbal_heartbeat(), looks: (-5.0, 10.0) };
         assert_eq!(flight.told(), expected, "after {away} s");
         assert_eq!(flight.world.snapshot().gimbals[0].rejected["1/1"]["no_gimbal_yet"], 1);
     }
