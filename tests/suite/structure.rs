@@ -62,6 +62,14 @@ fn the_sources_are_found_and_comments_and_tests_are_left_out() {
     assert!(files.contains(&PathBuf::from("src/wire.rs")), "{files:?}");
     assert!(files.contains(&PathBuf::from("src/wire/decoder.rs")), "{files:?}");
 
+    let files: Vec<PathBuf> = sources("gimbals").into_iter().map(|(file, _)| file).collect();
+    assert!(files.contains(&PathBuf::from("src/gimbals/parameters/list.rs")), "{files:?}");
+    // They are there, and are none of them.
+    for tests in ["src/gimbals/parameters/tests.rs", "src/gimbals/parameters/tests/any_gimbal.rs"] {
+        assert!(Path::new(env!("CARGO_MANIFEST_DIR")).join(tests).exists(), "{tests}");
+        assert!(!files.contains(&PathBuf::from(tests)), "{tests}");
+    }
+
     let code = production("use std::net::IpAddr; // tokio\n//! Instant\n#[cfg(test)]\nmod tests { SystemTime }");
     let seen: Vec<&str> = words(&code).filter(|word| IMPURE.contains(word)).collect();
     assert_eq!(seen, ["net"]);

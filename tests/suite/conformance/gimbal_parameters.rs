@@ -6,7 +6,6 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use gimbald::actions::Action;
-use gimbald::bridge::Input;
 use gimbald::bridge::settings::Settings;
 use gimbald::gimbals::gremsy::sim as gremsy;
 use gimbald::gimbals::gremsy::version::FirmwareVersion;
@@ -81,9 +80,7 @@ fn run(world: &mut World, places: Places, duration: Duration) {
 fn ask(world: &mut World, command: &str, in_path: Option<&str>, body: &str) -> OperationId {
     let action = Action::of_command(command).expect(command);
     let asked = action.read(in_path, body.as_bytes()).unwrap_or_else(|wrong| panic!("{command} {body}: {wrong}"));
-    let id = OperationId(1_000_000 + world.now.as_micros());
-    world.input(Input::Asked { id, gimbal: "camera", asked: &asked });
-    id
+    world.ask_by_name("camera", &asked)
 }
 
 /// The same, and its one answer.

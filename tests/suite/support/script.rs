@@ -285,11 +285,17 @@ pub fn quaternion(pitch_deg: f64, yaw_deg: f64) -> [f32; 4] {
     Attitude::<VehicleFrame>::from_gimbal_angles(angles).to_wxyz()
 }
 
-/// Pitch and yaw of a quaternion, degrees.
-pub fn pitch_yaw_deg(q: [f32; 4]) -> (f64, f64) {
+/// Roll, pitch and yaw of a quaternion, degrees.
+pub fn roll_pitch_yaw_deg(q: [f32; 4]) -> [f64; 3] {
     let attitude: Attitude<VehicleFrame> = Attitude::from_wxyz(q).expect("well formed").expect("a number");
     let angles = attitude.gimbal_angles();
-    (angles.pitch.degrees(), angles.yaw.degrees())
+    [angles.roll, angles.pitch, angles.yaw].map(Angle::degrees)
+}
+
+/// Pitch and yaw of a quaternion, degrees.
+pub fn pitch_yaw_deg(q: [f32; 4]) -> (f64, f64) {
+    let [_, pitch, yaw] = roll_pitch_yaw_deg(q);
+    (pitch, yaw)
 }
 
 /// `AUTOPILOT_STATE_FOR_GIMBAL_DEVICE` to `target`, on a vehicle that looks to `heading_deg`.

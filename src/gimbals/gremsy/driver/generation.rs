@@ -1,7 +1,8 @@
 //! Which of its two protocols a Gremsy speaks.
 //!
 //! The second one is there from firmware 7.7.3 on, and is used where the gimbal then sends
-//! `GIMBAL_DEVICE_ATTITUDE_STATUS` (285) when it is asked to. Once decided it stays so, for the two are never mixed.
+//! `GIMBAL_DEVICE_ATTITUDE_STATUS` (285) when it is asked to. Once decided it stays so until the gimbal is lost, for the two are
+//! never mixed.
 
 use std::time::Duration;
 

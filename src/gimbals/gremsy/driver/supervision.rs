@@ -3,9 +3,10 @@
 use std::time::Duration;
 
 use super::faults::Fault;
+use super::generation::Search;
 use super::told_rates::ToldRates;
 use super::{Generation, GremsyDriver, HandOver, Heard, LOST_AFTER, TICK, Timer, operations};
-use crate::gimbals::driver::DriverOutput;
+use crate::gimbals::driver::{DriverOutput, GimbalDriver};
 use crate::gimbals::gremsy::status::{Activity, SystemStatus};
 use crate::gimbals::operation::OperationError;
 use crate::gimbals::report::{Readiness, Report};
@@ -92,8 +93,13 @@ impl GremsyDriver {
         self.timers.set(Timer::Lost, now + LOST_AFTER);
         if !self.is_alive {
             self.is_alive = true;
+            let was_known = self.search.decided().is_some();
+            // Another may have taken its place, with other firmware; one that is to be stopped is told so as it was told to turn.
+            if !self.may_be_turning() {
+                self.search = Search::new(self.settings.generation, now);
+            }
             self.begin(now, device);
-            if self.search.decided().is_some() {
+            if was_known {
                 self.report_alive(device);
             }
         } else if self.off.is_some_and(|off| now.since(off.since) > REBOOT_TAKES_AT_LEAST) {

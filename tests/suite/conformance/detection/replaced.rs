@@ -1,5 +1,7 @@
 //! Another gimbal takes the place of one that was lost.
 
+use gimbald::gimbals::settings::Family;
+
 use super::*;
 
 const KINDS: [&str; 4] = ["mavlink_v1", "mavlink_v2", "gremsy v1", "gremsy v2"];
@@ -49,12 +51,50 @@ fn one_that_comes_back_after_a_v2_device_has_the_id_that_it_had() {
     for kind in ["mavlink_v1", "gremsy v1"] {
         let (mut world, places) = World::empty(three_links());
         world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
-        for (kind, device_id) in [(kind, 1), ("mavlink_v2", 154), (kind, 1)] {
+        for kind in [kind, "mavlink_v2", kind] {
             install(&mut world, places, kind);
             run(&mut world, places, 25 * SECOND);
-            assert_eq!(world.snapshot().gimbals[0].device_id, Some(device_id), "{kind}");
+            assert_eq!(world.snapshot().gimbals[0].device_id, device_id(kind), "{kind}");
             world.remove(places.gimbal);
             run(&mut world, places, 25 * SECOND);
         }
     }
+}
+
+/// One that comes in the place of a lost Gremsy is steered in the generation that it speaks itself.
+#[test]
+fn another_generation_in_the_place_of_a_lost_gremsy_is_found_out() {
+    for (before, after) in [("gremsy v1", "gremsy v2"), ("gremsy v2", "gremsy v1")] {
+        for family in [Family::Auto, Family::Gremsy] {
+            let camera = GimbalSettings { family, ..GimbalSettings::found("camera".to_owned()) };
+            let (mut world, places) = World::empty(Settings { gimbals: vec![camera], ..three_links() });
+            world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
+            for (kind, device_id) in [(before, device_id(before)), (after, device_id(after))] {
+                world.remove(places.gimbal);
+                run(&mut world, places, 15 * SECOND);
+                install(&mut world, places, kind);
+                run(&mut world, places, 30 * SECOND);
+                let command = command_long(MANAGER, 1000, &[-30.0, 20.0, NAN, NAN, 44.0, 0.0, 0.0]);
+                assert_eq!(
+                    world.result_of(places.ground, GCS, &command),
+                    Some(ACCEPTED),
+                    "{before} to {after}: {kind}"
+                );
+                run(&mut world, places, 8 * SECOND);
+                let gimbal = world.snapshot().gimbals.remove(0);
+                let angles =
+                    [gimbal.attitude.pitch_deg, gimbal.attitude.yaw_vehicle_deg].map(|angle| angle.map(f64::round));
+                assert_eq!(
+                    (gimbal.device_id, angles),
+                    (device_id, [Some(-30.0), Some(20.0)]),
+                    "{before} to {after}: {kind}"
+                );
+                assert_eq!(gimbal.details.faults, [""; 0], "{before} to {after}: {kind}");
+            }
+        }
+    }
+}
+
+fn device_id(kind: &str) -> Option<u8> {
+    Some(if kind.ends_with("v2") { GIMBAL.component } else { 1 })
 }

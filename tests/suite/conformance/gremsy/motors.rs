@@ -52,7 +52,7 @@ fn the_remedy_by_command_helps_as_well() {
             let (mut world, places) = running(generation);
             take_control(&mut world);
             assert_eq!(operate(&mut world, places, Operation::Motors(Motors::Off)), Some(Ok(())));
-            world.input(Input::Asked { id: OperationId(7), gimbal: "camera", asked: &Asked::ReleaseControl });
+            world.ask_by_name("camera", &Asked::ReleaseControl);
             demand(&mut world, places, [-30.0, 20.0, f32::NAN, f32::NAN, 0.0]);
             run(&mut world, places, Duration::from_millis(after));
             world.take(places.ground);
@@ -163,8 +163,7 @@ fn retract_keeps_them_off() {
     let (mut world, places) =
         running_with(device(Generation::V2), GremsySettings { retract_allowed: true, ..GremsySettings::default() });
     take_control(&mut world);
-    let retract = OperationId(1_000 + world.answers.len() as u64);
-    world.input(Input::Asked { id: retract, gimbal: "camera", asked: &Asked::Retract { may_cut_motors: true } });
+    world.ask_by_name("camera", &Asked::Retract { may_cut_motors: true });
     run(&mut world, places, 2 * SECOND);
 
     let id = ask_for(&mut world, places, Motors::On, 8 * SECOND);

@@ -9,10 +9,13 @@ use gimbald::gimbals::operation::{
     Stream, StreamRate, YawMode,
 };
 use gimbald::manager::asked::NotDone;
-use gimbald::wire::dialect::{COMMAND_ACK_DATA, MavMessage, PARAM_REQUEST_LIST_DATA};
+use gimbald::wire::dialect::{
+    COMMAND_ACK_DATA, GIMBAL_DEVICE_INFORMATION_DATA, GIMBAL_MANAGER_INFORMATION_DATA, MavMessage,
+    PARAM_REQUEST_LIST_DATA,
+};
 
 use super::*;
-use crate::support::script::{NAN, set_pitchyaw};
+use crate::support::script::{NAN, of, request_message, set_pitchyaw};
 use crate::support::world::GIMBAL;
 
 fn controlled(generation: Generation) -> (World, Places) {
@@ -69,9 +72,9 @@ fn what_is_asked_meanwhile_does_not_undo_an_operation() {
             run(&mut world, places, 5 * SECOND);
             world.forget();
             let off = Asked::Operation(Operation::Motors(Motors::Off));
-            world.input(Input::Asked { id: OperationId(1), gimbal: "camera", asked: &off });
+            world.ask_by_name("camera", &off);
             let meanwhile = Asked::Operation(meanwhile.clone());
-            world.input(Input::Asked { id: OperationId(2), gimbal: "camera", asked: &meanwhile });
+            world.ask_by_name("camera", &meanwhile);
 
             run(&mut world, places, 8 * SECOND);
 
@@ -146,7 +149,12 @@ fn resets_turn_it_where_they_say() {
             let (commands, setpoints) = orders(&mut world, places);
             match generation {
                 Generation::V1 => assert_eq!((commands, setpoints), (vec![packet::reset(GIMBAL, v1)], vec![])),
-                Generation::V2 => assert!(commands.is_empty() && (1..=5).contains(&setpoints.len()), "{setpoints:?}"),
+                Generation::V2 => {
+                    assert!(commands.is_empty() && (1..=5).contains(&setpoints.len()), "{setpoints:?}");
+                    let is_mapping = operation == Operation::Mapping;
+                    let is_as_asked = |told: &GIMBAL_DEVICE_SET_ATTITUDE_DATA| (told.flags & 0x4000 != 0) == is_mapping;
+                    assert!(setpoints.iter().all(is_as_asked), "{operation:?}: {setpoints:?}");
+                }
             }
         }
     }
@@ -159,7 +167,7 @@ fn an_operation_stops_what_turns() {
         let (mut world, places) = controlled(generation);
         let rate = gimbald::geometry::AngularRate::from_degrees_per_second;
         let turn = Asked::Turn { roll: None, pitch: rate(0.0), yaw: rate(15.0), yaw_frame: YawFrame::Vehicle };
-        world.input(Input::Asked { id: OperationId(5), gimbal: "camera", asked: &turn });
+        world.ask_by_name("camera", &turn);
         run(&mut world, places, SECOND);
         assert_eq!(operate(&mut world, places, Operation::Reset(ResetMode::PitchAndYaw)), Some(Ok(())));
         assert_looks(&world, 0.0, 0.0);
@@ -239,6 +247,17 @@ fn it_is_asked_once_more() {
     let (mut world, places) = controlled(Generation::V2);
     assert_eq!(operate(&mut world, places, Operation::RequestInformation), Some(Ok(())));
     assert_eq!(told(&mut world, places, command::REQUEST_MESSAGE), [packet::request_message(GIMBAL, 283)]);
+    // A ground station asks whoever tells it: a v2 gimbal itself, the manager of a v1 gimbal.
+    for (generation, speaker, id) in [(Generation::V1, MANAGER, 1), (Generation::V2, GIMBAL, 0)] {
+        let (mut world, places) = running(generation);
+        world.send(places.ground, GCS, &ground_heartbeat());
+        world.send(places.ground, GCS, &request_message(speaker, 283));
+        run(&mut world, places, SECOND);
+        let told = world.take(places.ground);
+        let told: Vec<_> = told.iter().filter(|told| told.id() == 283).collect();
+        assert_eq!(told.iter().map(|told| told.source()).collect::<Vec<_>>(), [speaker], "{generation:?}");
+        assert_eq!(told[0].decode::<GIMBAL_DEVICE_INFORMATION_DATA>().gimbal_device_id, id, "{generation:?}");
+    }
     assert_eq!(operate(&mut world, places, Operation::RefreshParameters), Some(Ok(())));
     let lists: Vec<PARAM_REQUEST_LIST_DATA> = from_manager(&mut world, places);
     assert_eq!(lists.len(), 1);
@@ -326,6 +345,38 @@ fn settings_are_written_and_read_back() {
     }
 }
 
+/// `get_limit_angle_…` by MAVLink: 280 of the manager, and 283 of whoever speaks for the gimbal, have the limits that it has.
+#[test]
+fn its_limits_are_told_to_clients() {
+    let limits = |min, max| AxisLimits::new(Angle::from_degrees(min), Angle::from_degrees(max)).expect("in order");
+    for (generation, speaker) in [(Generation::V1, MANAGER), (Generation::V2, GIMBAL)] {
+        let (mut world, places) = controlled(generation);
+        for (axis, limits) in
+            [(Axis::Tilt, limits(-80.0, 30.0)), (Axis::Roll, limits(-20.0, 25.0)), (Axis::Pan, limits(-100.0, 120.0))]
+        {
+            let set = Operation::SetLimits { axis, limits };
+            assert_eq!(operate(&mut world, places, set), Some(Ok(())), "{generation:?} {axis:?}");
+        }
+        let expected = [-20.0, 25.0, -80.0, 30.0, -100.0, 120.0];
+        let degrees = |limits: [f32; 6]| limits.map(|limit| (f64::from(limit).to_degrees() * 100.0).round() / 100.0);
+
+        world.forget();
+        world.send(places.ground, GCS, &request_message(speaker, 283));
+        run(&mut world, places, SECOND);
+        let told: Vec<GIMBAL_DEVICE_INFORMATION_DATA> = of(&world.take(places.ground));
+        let [told] = &told[..] else { panic!("{generation:?}: {told:?}") };
+        let limits = [told.roll_min, told.roll_max, told.pitch_min, told.pitch_max, told.yaw_min, told.yaw_max];
+        assert_eq!(degrees(limits), expected, "{generation:?}: 283");
+
+        world.send(places.ground, GCS, &request_message(MANAGER, 280));
+        run(&mut world, places, SECOND);
+        let told: Vec<GIMBAL_MANAGER_INFORMATION_DATA> = of(&world.take(places.ground));
+        let told = told.last().expect("280");
+        let limits = [told.roll_min, told.roll_max, told.pitch_min, told.pitch_max, told.yaw_min, told.yaw_max];
+        assert_eq!(degrees(limits), expected, "{generation:?}: 280");
+    }
+}
+
 /// A single parameter by its name, and what the gimbal does not take.
 #[test]
 fn a_parameter_by_its_name() {
@@ -346,11 +397,12 @@ fn a_parameter_by_its_name() {
     assert_eq!(seen(&world).details.radio_type.as_deref(), Some("herelink"));
 }
 
-/// What a ground station sets passes through, and is known here: the daemon's own parameters do not stand in its way.
+/// What a ground station sets passes through, and is known here: the daemon's own parameters do not stand in its way. It reads
+/// what it likes, too.
 #[test]
 fn what_a_ground_station_sets_is_known() {
     use crate::support::world::heartbeat;
-    use gimbald::wire::dialect::{CharArray, PARAM_SET_DATA, PARAM_VALUE_DATA};
+    use gimbald::wire::dialect::{CharArray, PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA};
     let (mut world, places) = running(Generation::V1);
     world.send(places.ground, GCS, &heartbeat(6, 8));
     let set = PARAM_SET_DATA {
@@ -366,6 +418,17 @@ fn what_a_ground_station_sets_is_known() {
     assert_eq!(sets(&mut world, places), []);
     let echoes: Vec<PARAM_VALUE_DATA> = crate::support::script::of(&world.take(places.ground));
     assert_eq!(echoes.iter().filter(|echo| echo.param_value == 9.0).count(), 1);
+    let read = PARAM_REQUEST_READ_DATA {
+        param_index: -1,
+        target_system: 1,
+        target_component: 154,
+        param_id: CharArray::from("GYRO_LPF"),
+    };
+    world.send(places.ground, GCS, &MavMessage::PARAM_REQUEST_READ(read));
+    run(&mut world, places, SECOND);
+    let values: Vec<PARAM_VALUE_DATA> = crate::support::script::of(&world.take(places.ground));
+    let values: Vec<_> = values.iter().map(|told| (told.param_id.to_str(), told.param_value)).collect();
+    assert_eq!(values, [(Ok("GYRO_LPF"), 9.0)]);
 }
 
 /// Gimbal statement 7: "A lost ACK leads to re-sends with confirmation 1 and 2 and success if the third is acknowledged." 8:
@@ -457,11 +520,11 @@ fn a_demand_ends_what_is_being_changed() {
     let (mut world, places) = controlled(Generation::V2);
     world.remove(places.gimbal);
     let asked = Asked::Operation(Operation::SetYawMode(YawMode::Lock));
-    world.input(Input::Asked { id: OperationId(77), gimbal: "camera", asked: &asked });
+    let changing = world.ask_by_name("camera", &asked);
     point(&mut world, -20.0, 0.0);
     let text = "another demand took its place".to_owned();
     assert_eq!(
-        world.answers.iter().find(|(id, _)| *id == OperationId(77)).map(|(_, answer)| answer.clone()),
+        world.answers.iter().find(|(id, _)| *id == changing).map(|(_, answer)| answer.clone()),
         failed(OperationError::NoEffect(text))
     );
 }

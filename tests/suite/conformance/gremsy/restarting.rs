@@ -189,8 +189,8 @@ fn while_it_starts_again_every_demand_is_refused_and_nothing_goes_on_afterwards(
                     datum: gimbald::manager::roi::Datum::MeanSeaLevel,
                 },
             };
-            world.input(Input::Asked { id: OperationId(1), gimbal: "camera", asked: &asked });
-            assert_eq!(world.answers.last(), Some(&(OperationId(1), Ok(()))));
+            let id = world.ask_by_name("camera", &asked);
+            assert_eq!(world.answers.last(), Some(&(id, Ok(()))));
             run(&mut world, places, SECOND);
 
             let id = restart(&mut world, Restart::Reboot);

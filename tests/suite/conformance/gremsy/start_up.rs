@@ -10,7 +10,7 @@ use gimbald::wire::{DatagramFrames, MavId};
 
 use super::*;
 use crate::support::interception::{Intercepted, Interceptor, Passage};
-use crate::support::script::of;
+use crate::support::script::{FAILED, of};
 use crate::support::world::{GIMBAL, heartbeat};
 
 /// Gimbal statement 1: "No byte is transmitted by the simulated Gremsy before it received a HEARTBEAT; within 1.2 s after
@@ -313,6 +313,39 @@ fn a_gimbal_that_does_not_come_back_from_a_reboot_is_lost() {
     assert_eq!(operate(&mut world, places, Operation::Restart(Restart::Shutdown)), Some(Ok(())));
     run(&mut world, places, 3 * SECOND);
     assert_eq!(seen(&world).state, "lost");
+}
+
+/// `present` and `get_connection` for a client: it can be steered and 285 comes; when it is gone a demand is FAILED, and 285 ends,
+/// or has `COMMS_ERROR` where the manager speaks for it.
+#[test]
+fn a_client_is_told_that_it_is_gone() {
+    use gimbald::wire::dialect::GIMBAL_DEVICE_ATTITUDE_STATUS_DATA;
+    use gimbald::wire::ids::FailureFlags;
+    for (generation, speaker) in [(Generation::V1, MANAGER), (Generation::V2, GIMBAL)] {
+        let (mut world, places) = running(generation);
+        let comms_errors = |world: &mut World| -> Vec<bool> {
+            world.forget();
+            run(world, places, 2 * SECOND);
+            let told = world.take(places.ground);
+            let told = told.iter().filter(|told| told.id() == message::GIMBAL_DEVICE_ATTITUDE_STATUS);
+            let told = told.inspect(|told| assert_eq!(told.source(), speaker, "{generation:?}"));
+            told.map(|told| told.decode::<GIMBAL_DEVICE_ATTITUDE_STATUS_DATA>().failure_flags)
+                .map(|flags| FailureFlags::from_bits_retain(flags).contains(FailureFlags::COMMS_ERROR))
+                .collect()
+        };
+        let told = comms_errors(&mut world);
+        assert!(told.len() >= 18 && !told.contains(&true), "{generation:?} {told:?}");
+        world.remove(places.gimbal);
+        run(&mut world, places, 6 * SECOND);
+        assert_eq!(seen(&world).state, "lost", "{generation:?}");
+        let told = comms_errors(&mut world);
+        match generation {
+            Generation::V1 => assert!(told.len() >= 18 && !told.contains(&false), "{told:?}"),
+            Generation::V2 => assert_eq!(told, Vec::<bool>::new()),
+        }
+        let pitchyaw = command_long(MANAGER, command::DO_GIMBAL_MANAGER_PITCHYAW, &[-10.0, 0.0]);
+        assert_eq!(world.result_of(places.ground, GCS, &pitchyaw), Some(FAILED), "{generation:?}");
+    }
 }
 
 /// A gimbal that is switched off and on is got to know anew, and not moved.

@@ -7,14 +7,14 @@ use std::time::Duration;
 use gimbald::bridge::Input;
 use gimbald::bridge::settings::Settings;
 use gimbald::geometry::{Angle, AngularRate, YawFrame};
-use gimbald::gimbals::operation::{Motors, Operation, OperationError, OperationId, ResetMode, Restart};
+use gimbald::gimbals::operation::{Motors, Operation, OperationError, ResetMode, Restart};
 use gimbald::gimbals::settings::{GimbalSettings, Takeover};
 use gimbald::manager::asked::{Answer, Asked, NotDone};
 use gimbald::manager::request::{AxisDemand, Refusal};
 use gimbald::manager::roi::Datum;
 use gimbald::manager::settings::ControlSettings;
 use gimbald::wire::MavId;
-use gimbald::wire::dialect::{MavMessage, PARAM_REQUEST_LIST_DATA};
+use gimbald::wire::dialect::{CharArray, MavMessage, PARAM_REQUEST_LIST_DATA, PARAM_VALUE_DATA};
 
 use super::{
     FIELD, SECOND, fly, look, only_setpoint, run_flying, run_looking, setpoints, told_control, with_gimbal,
@@ -183,7 +183,7 @@ fn who_is_not_in_control_is_refused_and_counted() {
     let information = Asked::Operation(Operation::RequestInformation);
     assert_eq!(ask(&mut world, &information), Err(NotDone::Operation(OperationError::Unsupported)));
     let refresh = Asked::Operation(Operation::RefreshParameters);
-    world.input(Input::Asked { id: OperationId(7), gimbal: NAME, asked: &refresh });
+    world.ask_by_name(NAME, &refresh);
     let lists: Vec<PARAM_REQUEST_LIST_DATA> = world.take_messages(places.gimbal);
     assert_eq!(lists.len(), 1, "it is asked for them");
 }
@@ -400,8 +400,8 @@ fn after_what_http_asked_a_command_is_no_repeat() {
 #[test]
 fn who_is_not_there_does_nothing() {
     let (mut world, places) = with_gimbal();
-    world.input(Input::Asked { id: OperationId(7), gimbal: "camera/../x", asked: &Asked::Stop });
-    assert_eq!(world.answers, [(OperationId(7), Err(NotDone::UnknownGimbal))]);
+    let id = world.ask_by_name("camera/../x", &Asked::Stop);
+    assert_eq!(world.answers, [(id, Err(NotDone::UnknownGimbal))]);
     world.unplug(places.gimbal);
     let lost = |reason| {
         Err(NotDone::Refused {
@@ -425,17 +425,31 @@ fn who_is_not_there_does_nothing() {
 /// a rate may last.
 #[test]
 fn settings_do_not_keep_the_rotation_of_a_silent_sender_alive() {
-    let control = ControlSettings { command_rate_timeout: Duration::ZERO, ..ControlSettings::default() };
-    let (mut world, places) = with_gimbal_that(usual_capabilities(), Settings { control, ..three_links() });
-    assert_eq!(world.result_of(places.ground, GCS, &pitchyaw(NAN, NAN, 0.0, 5.0, 44.0)), Some(ACCEPTED));
-    for second in 0..12 {
-        let mode = world.snapshot().gimbals[0].setpoint.as_ref().expect("it was told").mode.clone();
-        assert_eq!(mode == "rate", second < 10, "{mode} after {second} s");
-        let set = Asked::Operation(Operation::SetCombinedAttitude(true));
-        assert_eq!(ask(&mut world, &set), Err(NotDone::Operation(OperationError::Unsupported)));
-        let status = device_status(world.now, 44, 0.0, 0.0);
-        let status = MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status);
-        world.run_with(SECOND, &[(SECOND / 10, places.gimbal, GIMBAL, status)]);
+    let parameter = Operation::SetParameter { name: "PWR_PAN".to_owned(), value: 1.0 };
+    let echo = PARAM_VALUE_DATA {
+        param_value: 1.0,
+        param_count: 40,
+        param_index: 10,
+        param_id: CharArray::from("PWR_PAN"),
+        param_type: 9,
+    };
+    let unsupported = Err(NotDone::Operation(OperationError::Unsupported));
+    for (set, answer) in [(parameter, Ok(())), (Operation::SetCombinedAttitude(true), unsupported)] {
+        let control = ControlSettings { command_rate_timeout: Duration::ZERO, ..ControlSettings::default() };
+        let (mut world, places) = with_gimbal_that(usual_capabilities(), Settings { control, ..three_links() });
+        world.send(places.gimbal, GIMBAL, &MavMessage::PARAM_VALUE(echo.clone()));
+        assert_eq!(world.result_of(places.ground, GCS, &pitchyaw(NAN, NAN, 0.0, 5.0, 44.0)), Some(ACCEPTED));
+        for second in 0..12 {
+            let mode = world.snapshot().gimbals[0].setpoint.as_ref().expect("it was told").mode.clone();
+            assert_eq!(mode == "rate", second < 10, "{mode} after {second} s, {set:?}");
+            world.answers.clear();
+            let id = world.ask_by_name(NAME, &Asked::Operation(set.clone()));
+            world.send(places.gimbal, GIMBAL, &MavMessage::PARAM_VALUE(echo.clone()));
+            assert_eq!(world.answers, [(id, answer.clone())], "{set:?}");
+            let status = device_status(world.now, 44, 0.0, 0.0);
+            let status = MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status);
+            world.run_with(SECOND, &[(SECOND / 10, places.gimbal, GIMBAL, status)]);
+        }
     }
 }
 
@@ -473,9 +487,8 @@ fn each_gimbal_is_asked_by_its_own_name() {
     let gimbals = ["left", "right"].map(|name| GimbalSettings::found(name.to_owned())).into();
     let (mut world, places) = World::empty(Settings { gimbals, ..three_links() });
     world.run_for(SECOND);
-    world.input(Input::Asked { id: OperationId(1), gimbal: "right", asked: &Asked::TakeControl });
-    world.input(Input::Asked { id: OperationId(2), gimbal: "Right", asked: &Asked::TakeControl });
-    assert_eq!(world.answers, [(OperationId(1), Ok(())), (OperationId(2), Err(NotDone::UnknownGimbal))]);
+    let [right, other] = ["right", "Right"].map(|name| world.ask_by_name(name, &Asked::TakeControl));
+    assert_eq!(world.answers, [(right, Ok(())), (other, Err(NotDone::UnknownGimbal))]);
     let held: Vec<Option<String>> = world.snapshot().gimbals.into_iter().map(|gimbal| gimbal.primary).collect();
     assert_eq!(held, [None, Some("http".to_owned())]);
     assert!(setpoints(&mut world, places).is_empty());

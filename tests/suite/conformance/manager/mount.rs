@@ -11,8 +11,8 @@ use super::{
 };
 use crate::support::script::{
     ACCEPTED, DENIED, NAN, TEMPORARILY_REJECTED, UNSUPPORTED, ack, again, command_int, command_long, configure,
-    mount_configure, mount_control, of, pitch_yaw_deg, pitchyaw, quaternion, set_attitude, take_control, to,
-    usual_capabilities,
+    mount_configure, mount_control, of, pitch_yaw_deg, pitchyaw, quaternion, roll_pitch_yaw_deg, set_attitude,
+    take_control, to, usual_capabilities,
 };
 use crate::support::world::{AUTOPILOT, GCS, GIMBAL, MANAGER, World, three_links};
 
@@ -41,9 +41,7 @@ fn client_items_e127_and_e128_angles_of_a_mount_are_those_of_a_gimbal() {
     // Roll has a parameter of its own.
     let (mut world, places) = with_gimbal();
     assert_eq!(world.result_of(places.ground, GCS, &control([-20.0, 8.0, NAN], 2.0)), Some(ACCEPTED));
-    let q = only_setpoint(&mut world, places).q.map(f64::from);
-    let roll = (2.0 * (q[2] * q[3] + q[0] * q[1])).asin();
-    assert_near(roll.to_degrees(), 8.0, 0.001);
+    assert_near(roll_pitch_yaw_deg(only_setpoint(&mut world, places).q)[0], 8.0, 0.001);
 }
 
 /// What each mode does, in both commands.
@@ -92,7 +90,11 @@ fn statement_42_radio_control_gets_a_gimbal_that_has_one() {
         let (mut world, places) = with_gimbal_that(capabilities, three_links());
         look(&mut world, places, -10.0, 5.0);
         world.forget();
-        world.send(places.ground, GCS, &command);
+        if matches!(command, MavMessage::COMMAND_LONG(_)) {
+            assert_eq!(world.result_of(places.ground, GCS, &command), Some(ACCEPTED), "{command:?}");
+        } else {
+            world.send(places.ground, GCS, &command);
+        }
         let setpoint = only_setpoint(&mut world, places);
         assert_eq!(setpoint.flags, 44 | 256, "{command:?}");
         assert_eq!(world.snapshot().gimbals[0].setpoint, None, "{command:?}");
@@ -121,16 +123,25 @@ fn the_inputs_of_a_mount_are_what_their_sender_configured() {
         assert_near(pitch_yaw_deg(setpoint.q).1, yaw, 0.001);
     }
 
-    // "In the order roll, pitch, yaw", by either form: a roll in degrees per second beside a pitch in degrees.
+    // "In the order roll, pitch, yaw", by either form: a roll in degrees per second beside a pitch in degrees, and beside angles
+    // roll is level.
     for rates in [configure_mount(2.0, [1.0, 0.0, 0.0]), command_int(MANAGER, 204, [2.0, 1.0, 1.0, 1.0], 1, 0, 0.0)] {
         assert_eq!(world.result_of(places.ground, GCS, &rates), Some(ACCEPTED));
         assert_eq!(world.result_of(places.ground, GCS, &control([-20.0, 5.0, 40.0], 2.0)), Some(ACCEPTED));
-        let q = only_setpoint(&mut world, places).q;
-        let (pitch, yaw) = pitch_yaw_deg(q);
+        let [roll, pitch, yaw] = roll_pitch_yaw_deg(only_setpoint(&mut world, places).q);
         assert_near(pitch, -20.0, 0.001);
         assert_near(yaw, 40.0, 0.001);
-        let [w, x, y, z] = q.map(f64::from);
-        assert_near((2.0 * (y * z + w * x)).asin().to_degrees(), 0.0, 0.5);
+        assert_near(roll, 0.0, 0.5);
+    }
+
+    // The three of them as rates.
+    assert_eq!(world.result_of(places.ground, GCS, &configure_mount(2.0, [1.0; 3])), Some(ACCEPTED));
+    assert_eq!(world.result_of(places.ground, GCS, &control([-20.0, 5.0, 40.0], 2.0)), Some(ACCEPTED));
+    let setpoint = only_setpoint(&mut world, places);
+    assert!(is_nan(&setpoint.q));
+    let rates = [setpoint.angular_velocity_x, setpoint.angular_velocity_y, setpoint.angular_velocity_z];
+    for (rate, expected) in rates.into_iter().zip([5.0_f64, -20.0, 40.0]) {
+        assert_near(rate.into(), expected.to_radians(), 1e-6);
     }
 
     // Pitch and yaw as rates, by either form.

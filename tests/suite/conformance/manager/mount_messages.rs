@@ -6,7 +6,7 @@ use gimbald::wire::dialect::{COMMAND_ACK_DATA, MavMessage};
 use super::frames::turn_vehicle;
 use super::mount::configure_mount;
 use super::{COMPANION, FIELD, SECOND, assert_near, fly, only_setpoint, run_looking, setpoints, with_gimbal};
-use crate::support::script::{ACCEPTED, mount_configure, mount_control, of, pitch_yaw_deg};
+use crate::support::script::{ACCEPTED, mount_configure, mount_control, of, pitch_yaw_deg, roll_pitch_yaw_deg};
 use crate::support::world::{AUTOPILOT, GCS, MANAGER, Places, World};
 
 /// The messages of v1, addressed to us or to everybody: what the commands do, without an answer.
@@ -20,16 +20,13 @@ fn statement_39_the_messages_of_a_mount_do_what_its_commands_do() {
     let (mut world, places) = with_gimbal();
     world.send_bytes(places.ground, &GOLDEN);
     let setpoint = only_setpoint(&mut world, places);
-    let (pitch, yaw) = pitch_yaw_deg(setpoint.q);
-    assert_near(pitch, -45.0, 0.001);
-    assert_near(yaw, 30.0, 0.001);
+    assert_angles(setpoint.q, [0.0, -45.0, 30.0]);
     assert_eq!(setpoint.flags, 44);
 
     turn_vehicle(&mut world, places, 0.0);
     for target in [MANAGER, MavId::new(1, 0), MavId::new(0, 0)] {
         assert_eq!(acks(&mut world, places, GCS, &mount_control(target, [-2_000, 800, 1_000])), 0);
-        let setpoint = only_setpoint(&mut world, places);
-        assert_near(pitch_yaw_deg(setpoint.q).0, -20.0, 0.001);
+        assert_angles(only_setpoint(&mut world, places).q, [8.0, -20.0, 10.0]);
         // What the autopilot says to every mount is how it drives one.
         let told = usize::from(target == MANAGER);
         world.forget();
@@ -83,6 +80,12 @@ fn a_rate_by_message_ends_as_a_stream() {
     run_looking(&mut world, places, SECOND, 0.0, 0.0);
     let told = setpoints(&mut world, places);
     assert!(told.last().is_some_and(|(_, told)| told.angular_velocity_y == 0.0 || told.angular_velocity_y.is_nan()));
+}
+
+fn assert_angles(q: [f32; 4], roll_pitch_yaw: [f64; 3]) {
+    for (told, expected) in roll_pitch_yaw_deg(q).into_iter().zip(roll_pitch_yaw) {
+        assert_near(told, expected, 0.001);
+    }
 }
 
 fn acks(world: &mut World, places: Places, sender: MavId, message: &MavMessage) -> usize {

@@ -172,7 +172,7 @@ fn client_item_e132_of_a_gimbal_that_sends_mavlink_1_only_that_is_said_first() {
                 point(&mut world, places, [-30.0, 0.0]);
             }
             if step == 20 && sends_version_2 {
-                world.send(places.gimbal, GIMBAL, &heartbeat(26, 4));
+                world.send(places.gimbal, GIMBAL, &gimbal_heartbeat());
             }
             world.run_for(SECOND / 4);
             faults = told_of_it(&world, places).1;
