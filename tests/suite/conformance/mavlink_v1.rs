@@ -15,14 +15,15 @@ use gimbald::gimbals::signs::Signs;
 use gimbald::manager::asked::NotDone;
 use gimbald::wire::MavId;
 use gimbald::wire::dialect::{
-    COMMAND_LONG_DATA, CharArray, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA,
-    GIMBAL_MANAGER_SET_PITCHYAW_DATA, MOUNT_ORIENTATION_DATA, MavMessage, PARAM_REQUEST_LIST_DATA,
-    PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA,
+    COMMAND_LONG_DATA, CharArray, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA,
+    GIMBAL_DEVICE_SET_ATTITUDE_DATA, GIMBAL_MANAGER_SET_PITCHYAW_DATA, MOUNT_ORIENTATION_DATA, MavMessage,
+    PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA,
 };
 
 use crate::support::script::{
     ACCEPTED, DENIED, NAN, UNSUPPORTED, ack, autopilot_state, command_long, device_information, device_status,
-    gimbal_heartbeat, ground_heartbeat, of, pitch_yaw_deg, px4_heartbeat, quaternion, set_pitchyaw, usual_capabilities,
+    gimbal_heartbeat, ground_heartbeat, of, pitch_yaw_deg, px4_heartbeat, quaternion, request_message, set_pitchyaw,
+    usual_capabilities,
 };
 use crate::support::world::{AUTOPILOT, GCS, GIMBAL, MANAGER, Places, World, heartbeat, three_links};
 
@@ -122,6 +123,34 @@ fn item_175_what_a_v1_gimbal_reports_is_an_attitude_status() {
     assert!(status.delta_yaw.is_nan(), "no heading is known");
     let wanted = quaternion(-30.0, 15.0);
     assert!(status.q.iter().zip(wanted).all(|(told, wanted)| (told - wanted).abs() < 1e-6), "{:?}", status.q);
+}
+
+/// Gimbal statement 47: "Without any v1 feedback 285 is produced open loop, slew-limited, and marked": by the manager, ten
+/// times a second, at 30 degrees a second; 283 and the status say that it is a guess.
+#[test]
+fn statement_47_what_a_v1_gimbal_does_not_report_is_guessed_and_said_to_be() {
+    let (mut world, places) = World::empty(Settings { gimbals: vec![v1_gimbal()], ..three_links() });
+    let beats = [(SECOND, places.gimbal, GIMBAL, heartbeat(26, 0)), (SECOND, places.ground, GCS, ground_heartbeat())];
+    world.run_with(4 * SECOND, &beats);
+    look(&mut world, places, [-60.0, 90.0], 44.0);
+    let mut guesses = Vec::new();
+    for _ in 0..4 {
+        world.forget();
+        world.run_with(SECOND, &beats);
+        let heard = world.take(places.ground);
+        let told: Vec<_> = heard.iter().filter(|arrival| arrival.id() == 285).collect();
+        assert!(told.len() == 10 && told.iter().all(|arrival| arrival.source() == MANAGER), "{}", told.len());
+        let last: GIMBAL_DEVICE_ATTITUDE_STATUS_DATA = told[9].decode();
+        let (pitch, yaw) = pitch_yaw_deg(last.q);
+        guesses.push([pitch.round() as i32, yaw.round() as i32]);
+        assert!(world.snapshot().gimbals[0].attitude.assumed);
+    }
+    // The last of each second is a tenth old.
+    assert_eq!(guesses, [[-27, 27], [-57, 57], [-60, 87], [-60, 90]]);
+
+    world.send(places.ground, GCS, &request_message(MANAGER, 283));
+    let told: Vec<GIMBAL_DEVICE_INFORMATION_DATA> = of(&world.take(places.ground));
+    assert_eq!(told.iter().map(|told| told.custom_name.to_str()).collect::<Vec<_>>(), [Ok("open loop")]);
 }
 
 /// Gimbal statement 35: "Earth yaw 90 with heading 70 gives v1 p3 = 20; heading changing to 100 gives −10 without a new client
