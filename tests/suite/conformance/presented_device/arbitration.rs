@@ -274,19 +274,16 @@ fn a_rate_that_only_jitters_ends_as_one_that_nobody_changes() {
     for by in [0.02, 0.2] {
         let mut flight = Flight::new(presenting());
         let jitter = |flight: &mut Flight, seconds: usize| {
-            for _ in 0..seconds * 25 {
-                flight.demand(turning(2.0 + by, 0.0), PERIOD);
-                flight.demand(turning(2.0 - by, 0.0), PERIOD);
+            for tenth in 0..seconds * 10 {
+                flight.demand = turning(if tenth % 2 == 0 { 2.0 + by } else { 2.0 - by }, 0.0);
+                flight.follow(SECOND / 10);
             }
+            flight.looks
         };
-        jitter(&mut flight, 9);
-        let before = flight.told();
-        jitter(&mut flight, 1);
-        assert_ne!(flight.told(), before, "{by}: it turns");
-        jitter(&mut flight, 3);
-        let after = flight.told();
-        jitter(&mut flight, 30);
-        assert_eq!(flight.told(), after, "{by}: it has stopped");
+        let before = jitter(&mut flight, 9);
+        assert_ne!(jitter(&mut flight, 1), before, "{by}: it turns");
+        let after = jitter(&mut flight, 3);
+        assert_eq!(jitter(&mut flight, 30), after, "{by}: it has stopped");
         assert_eq!(flight.stream(), "steady");
 
         // And what is asked for next is done.
@@ -294,6 +291,7 @@ fn a_rate_that_only_jitters_ends_as_one_that_nobody_changes() {
         assert_eq!(flight.told(), Some((44, -45, 30)));
     }
 }
+
 /// PX4 with `MNT_MODE_OUT` 2 drives a device as well, and in its own way: 283 is asked of everybody, 284 comes to no component
 /// in particular, with frame bits, with NaN before it has any input, and with the identity beside a rate.
 #[test]
