@@ -45,9 +45,7 @@ impl Bridge {
             Hearing::Device { gimbal, twin } => {
                 gimbal.manager.handle_device_heard(now);
                 if !is_answer_to_another(frame, MavId::new(system, gimbal.component)) {
-                    if gimbal.driver.may_be_turning() {
-                        gimbal.driver.handle_vehicle_heading(self.vehicle.heading_by_now(now));
-                    }
+                    gimbal.driver.handle_vehicle_heading(self.vehicle.heading_by_now(now));
                     gimbal.driver.handle_received(now, frame);
                 }
                 let may_be_self_managed = gimbal.is_only_a_heartbeat();

@@ -24,8 +24,7 @@ pub trait GimbalDriver: std::fmt::Debug {
     /// A frame that the device sent, but for what it answers to others.
     fn handle_received(&mut self, now: Timestamp, frame: &Frame<'_>);
 
-    /// Where the vehicle's nose points, where that is known, from North; told before each frame while the gimbal may be
-    /// turning.
+    /// Where the vehicle's nose points, where that is known, from North; told before each frame.
     fn handle_vehicle_heading(&mut self, _heading: Option<Angle>) {}
 
     /// The link to the device is gone, and the device with it.

@@ -272,7 +272,7 @@ impl Tracking {
         let wanted = self.setpoint(situation).map(|wanted| self.nudge.added_to(wanted, situation));
         let wanted = wanted.and_then(|wanted| self.for_device(wanted, situation));
         self.note_stale(wanted.is_none() || self.has_lost_the_vehicle(situation));
-        self.last = wanted.or(self.last.map(Setpoint::at_rest));
+        self.last = wanted.or_else(|| self.last.map(|last| situation.without_north(last.at_rest())));
         self.last_at = now;
         self.last_heading = situation.heading;
         self.next = (self.aim != Aim::Idle).then(|| now + self.period);

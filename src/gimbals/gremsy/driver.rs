@@ -120,8 +120,10 @@ pub struct GremsyDriver {
     unit_change: Option<OperationId>,
     heard: Heard,
     vehicle_turn: VehicleTurn,
-    /// What the autopilot says of it while the gimbal may be turning.
+    /// What the autopilot says of it.
     vehicle_heading: Option<Angle>,
+    /// Since when that is told without a gap.
+    is_fed_since: Option<Timestamp>,
     negated: Negated,
     effect: EffectWatch,
     faults: Faults,
@@ -206,6 +208,7 @@ impl GremsyDriver {
             heard: Heard::default(),
             vehicle_turn: VehicleTurn::default(),
             vehicle_heading: None,
+            is_fed_since: None,
             negated: settings.negated(),
             effect: EffectWatch::default(),
             faults: Faults::default(),
@@ -306,6 +309,7 @@ impl GimbalDriver for GremsyDriver {
 
     fn handle_received(&mut self, now: Timestamp, frame: &Frame<'_>) {
         let Some(device) = self.device.filter(|device| *device == frame.source()) else { return };
+        self.is_fed_since = self.vehicle_heading.map(|_| self.is_fed_since.unwrap_or(now));
         self.handle_heard(now, device);
         if let Some(stream) = streams::stream_of(frame.message_id()) {
             self.streams.handle_heard(now, stream);

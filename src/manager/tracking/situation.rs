@@ -1,8 +1,9 @@
 //! What the tracking has to go by at one moment.
 
-use crate::geometry::{Angle, Position, YawFrame};
+use crate::geometry::{Angle, Position, Yaw, YawFrame};
 use crate::gimbals::capabilities::Capabilities;
 use crate::gimbals::report::GimbalStatus;
+use crate::gimbals::setpoint::{Pointing, Setpoint};
 use crate::gimbals::settings::DeviceYawFrame;
 use crate::wire::ids::{CapFlags, GimbalFlags};
 
@@ -34,6 +35,18 @@ impl Situation<'_> {
             DeviceYawFrame::Auto if self.accepts_earth_yaw => frame,
             DeviceYawFrame::Auto | DeviceYawFrame::Vehicle => YawFrame::Vehicle,
             DeviceYawFrame::Earth => YawFrame::Earth,
+        }
+    }
+
+    /// A setpoint from North for a device that does not know that any more: it stays as it looks from the nose.
+    pub(super) fn without_north(&self, setpoint: Setpoint) -> Setpoint {
+        match (setpoint, self.measured_pose(YawFrame::Vehicle)) {
+            (Setpoint::Point(pointing @ Pointing { yaw: Yaw::InEarthFrame(_), .. }), Some(pose))
+                if self.device_frame(YawFrame::Earth) == YawFrame::Vehicle =>
+            {
+                Setpoint::Point(Pointing { yaw: Yaw::InVehicleFrame(pose.yaw), ..pointing })
+            }
+            _ => setpoint,
         }
     }
 

@@ -309,7 +309,15 @@ impl Mount {
             return;
         }
         match wanted {
-            Order::Home | Order::Retract | Order::RadioControl => self.give(device),
+            // In LOCK it would go there once, and turn away from the nose with the vehicle.
+            Order::Home => {
+                if self.has_motors(now, device, condition) && self.is_in_mode(now, device, YawMode::Follow) {
+                    self.give(device);
+                } else {
+                    self.is_given = false;
+                }
+            }
+            Order::Retract | Order::RadioControl => self.give(device),
             Order::Point { mode, .. } | Order::Turn { mode, .. } => {
                 if self.has_motors(now, device, condition) && self.is_in_mode(now, device, mode) {
                     self.send_when_due(now, device, condition);
@@ -330,7 +338,7 @@ impl Mount {
         let waits = match (wanted, self.mode, self.retraction) {
             _ if wanted.is_stop() => None,
             _ if !condition.is_ready => return dead_man,
-            (Order::Home | Order::Retract | Order::RadioControl, ..) => return dead_man,
+            (Order::Retract | Order::RadioControl, ..) => return dead_man,
             (_, _, Retraction::Returning { since }) => Some(since + MOTORS_START),
             (_, Mode::Refused(_, at), _) => Some(at + REFUSED_FOR),
             (Order::Point { mode: wanted, .. } | Order::Turn { mode: wanted, .. }, Mode::Is(mode), _)

@@ -22,6 +22,9 @@ use crate::wire::{Frame, MavId};
 /// Beside another message, an orientation counts for so long.
 const ORIENTATION_FRESH: std::time::Duration = std::time::Duration::from_millis(500);
 
+/// The autopilot's attitude puts its North right within so long.
+const NORTH_WITHIN: std::time::Duration = std::time::Duration::from_secs(2);
+
 impl GremsyDriver {
     /// `MOUNT_ORIENTATION`: the attitude in v1.
     pub(super) fn handle_orientation(&mut self, now: Timestamp, device: MavId, frame: &Frame<'_>) {
@@ -37,9 +40,9 @@ impl GremsyDriver {
             self.handle_boot_ms(now, device, message.time_boot_ms);
         }
         let is_locked = self.is_locked();
-        let is_wrong = self.version().is_some_and(|version| version.has_wrong_earth_yaw());
-        // In LOCK its yaw from North counts, unless that one is known to be wrong.
-        let attitude = orientation.attitude(is_locked && !is_wrong);
+        let knows_north = self.knows_north(now);
+        // In LOCK its yaw from North counts, where it knows that.
+        let attitude = orientation.attitude(is_locked && knows_north);
         let mut flags = GimbalFlags::ROLL_LOCK | GimbalFlags::PITCH_LOCK;
         flags.set(GimbalFlags::YAW_LOCK, is_locked);
         flags |= match attitude.yaw() {
@@ -60,7 +63,7 @@ impl GremsyDriver {
                 heading: None,
                 flags,
                 failures: self.failures(),
-                accepts_earth_yaw: self.takes_earth_yaw(),
+                accepts_earth_yaw: knows_north,
             },
         );
     }
@@ -149,11 +152,12 @@ impl GremsyDriver {
         }
     }
 
-    /// Whether yaw may be told from North: where the autopilot's attitude keeps it from drifting, and it is not known to be
-    /// wrong.
-    fn takes_earth_yaw(&self) -> bool {
+    /// Whether its yaw from North is one: "without autopilot attitude (286 or ATTITUDE) it drifts; north is not known", "combine
+    /// attitude" in its parameters has it use that, and in some firmware it is wrong.
+    fn knows_north(&self, now: Timestamp) -> bool {
         let is_wrong = self.version().is_some_and(|version| version.has_wrong_earth_yaw());
-        !is_wrong && self.axis_flags().is_some_and(|flags| flags.contains(AxisFlags::COMBINE_ATTITUDE))
+        let is_fed = self.is_fed_since.is_some_and(|since| now.since(since) >= NORTH_WITHIN);
+        !is_wrong && is_fed && self.axis_flags().is_some_and(|flags| flags.contains(AxisFlags::COMBINE_ATTITUDE))
     }
 
     pub(super) fn axis_flags(&self) -> Option<AxisFlags> {

@@ -13,7 +13,7 @@ use gimbald::wire::dialect::{
 use gimbald::wire::ids::{CommandResult, GimbalFlags};
 
 use super::*;
-use crate::support::script::{DENIED, NAN, quaternion, set_attitude, set_pitchyaw};
+use crate::support::script::{ACCEPTED, DENIED, NAN, TEMPORARILY_REJECTED, quaternion, set_attitude, set_pitchyaw};
 use crate::support::world::GIMBAL;
 
 fn bytes(text: &str) -> Vec<u8> {
@@ -216,6 +216,76 @@ fn v1_yaw_from_north_by_the_vehicle_or_by_lock() {
     }
 }
 
+/// The flags of every 285 that a ground station gets in the next second.
+fn told_flags(world: &mut World, places: Places) -> Vec<u16> {
+    world.forget();
+    run(world, places, SECOND);
+    let told: Vec<GIMBAL_DEVICE_ATTITUDE_STATUS_DATA> = world.take_messages(places.ground);
+    let mut flags: Vec<u16> = told.iter().map(|told| told.flags).collect();
+    flags.dedup();
+    flags
+}
+
+/// "31011 p7=1 (LOCK) then 205 yaw earth only if attitude is fed; otherwise vehicle yaw" (gimbals 2.5); "without autopilot attitude
+/// … it drifts; north is not known" (1.7); "autopilot attitude stale 1.0 s -> earth-yaw clients demoted: hold last vehicle yaw" (5.8);
+/// fed again, its North is right after 2 s (5.1).
+#[test]
+fn v1_no_yaw_is_from_north_without_the_autopilots_attitude() {
+    let north = command_long(MANAGER, 1000, &[-10.0, 90.0, NAN, NAN, 92.0, 0.0, 0.0]);
+    let (mut world, places) = running(Generation::V1);
+    assert_eq!(seen(&world).details.combined_attitude, Some(true));
+    assert_eq!(world.result_of(places.ground, GCS, &north), Some(ACCEPTED));
+    run(&mut world, places, 6 * SECOND);
+    assert_eq!(orders(&mut world, places).0[0], packet::lock(GIMBAL));
+
+    world.unplug(places.autopilot);
+    run(&mut world, places, 2 * SECOND);
+    let follows = orders(&mut world, places).0.contains(&packet::follow(GIMBAL));
+    let (_, held) = looks(&world);
+    assert!(follows && seen(&world).setpoint.expect("a setpoint").stale, "{:?}", seen(&world).setpoint);
+    run(&mut world, places, 5 * SECOND);
+    assert!((looks(&world).1 - held).abs() < 1.0, "{held} became {}", looks(&world).1);
+    assert_eq!(world.result_of(places.ground, GCS, &north), Some(TEMPORARILY_REJECTED));
+    // YAW_IN_VEHICLE_FRAME, and no yaw from North is taken; what was asked for is to lock it.
+    assert_eq!(told_flags(&mut world, places), [0x3c]);
+
+    world.plug_in(places.autopilot);
+    run(&mut world, places, SECOND);
+    assert_eq!(world.result_of(places.ground, GCS, &north), Some(ACCEPTED));
+    run(&mut world, places, SECOND);
+    assert!(!orders(&mut world, places).0.contains(&packet::lock(GIMBAL)), "its North is not right yet");
+    run(&mut world, places, 3 * SECOND);
+    assert!(orders(&mut world, places).0.contains(&packet::lock(GIMBAL)));
+
+    // No autopilot was ever heard.
+    let (mut world, places) = without_gimbal(GremsySettings::default());
+    world.install(places.gimbal, Device::new(Timestamp::ZERO, device(Generation::V1)));
+    run(&mut world, places, 25 * SECOND);
+    world.forget();
+    assert_eq!(world.result_of(places.ground, GCS, &north), Some(TEMPORARILY_REJECTED));
+    assert_eq!(orders(&mut world, places), (vec![], vec![]));
+    assert_eq!(told_flags(&mut world, places), [0x2c]);
+}
+
+/// "flags 0x2C | (0x10 if LOCK)" (gimbals 2.5): its 285 tells the mode that it is in, whoever asked for that.
+#[test]
+#[rustfmt::skip]
+fn v1_its_285_tells_the_mode_that_it_is_in() {
+    use gimbald::gimbals::operation::YawMode;
+    let (mut world, places) = running(Generation::V1);
+    take_control(&mut world);
+    for (operation,                                flags) in [
+        (Operation::SetYawMode(YawMode::Lock),     0x0bc),
+        (Operation::Reset(ResetMode::PitchAndYaw), 0x0bc),
+        (Operation::RadioControl,                  0x1bc),
+        (Operation::SetYawMode(YawMode::Follow),   0x0ac),
+    ] {
+        let named = format!("{operation:?}");
+        assert_eq!(operate(&mut world, places, operation), Some(Ok(())), "{named}");
+        assert_eq!(told_flags(&mut world, places), [flags], "{named}");
+    }
+}
+
 /// "flags 0x0C plus YAW_LOCK/frame bits"; firmware before 7.8.7 knows no frame bits and gets none (gimbals 1.5, 1.7).
 #[test]
 #[rustfmt::skip]
@@ -329,6 +399,36 @@ fn neutral_takes_it_home() {
                 let neutral = |setpoint: &GIMBAL_DEVICE_SET_ATTITUDE_DATA| setpoint.flags & 2 != 0;
                 assert!(!setpoints.is_empty() && setpoints.iter().all(neutral), "{setpoints:?}");
             }
+        }
+    }
+}
+
+/// `MAV_CMD_DO_SET_ROI_NONE`: "the gimbal ... should ... assume a neutral position"; "YAW_IN_VEHICLE_FRAME: yaw angle ... relative to
+/// the vehicle heading": after a yaw from North neutral is the nose, wherever the vehicle turns. A v1 gimbal that is locked is told
+/// FOLLOW for that.
+#[test]
+fn neutral_stays_ahead_of_a_vehicle_that_turns() {
+    for generation in [Generation::V1, Generation::V2] {
+        let (mut world, places) = running(generation);
+        demand(&mut world, places, [-20.0, 90.0, NAN, NAN, 92.0]);
+        run(&mut world, places, 4 * SECOND);
+        assert!(seen(&world).flags.contains(&"yaw_lock".to_owned()), "{generation:?}");
+        world.forget();
+        demand(&mut world, places, [0.0, 0.0, NAN, NAN, 2.0]);
+        run(&mut world, places, 10 * SECOND);
+        let turned = world.snapshot().vehicle.heading_deg;
+        for _ in 0..10 {
+            assert_looks(&world, 0.0, 0.0);
+            run(&mut world, places, SECOND);
+        }
+        assert_ne!(world.snapshot().vehicle.heading_deg, turned, "the vehicle turns");
+        let (commands, setpoints) = orders(&mut world, places);
+        match generation {
+            Generation::V1 => {
+                let home = packet::reset(GIMBAL, ResetMode::PitchAndYaw);
+                assert_eq!((commands, setpoints), (vec![packet::follow(GIMBAL), home], vec![]));
+            }
+            Generation::V2 => assert_eq!(commands, []),
         }
     }
 }

@@ -289,6 +289,47 @@ fn home_and_radio_control_are_said_once() {
     }
 }
 
+/// "NEUTRAL: 31011 p6=3 p7=4" (gimbals 2.5) is ahead of the vehicle, and stays there: from LOCK, or where its mode is not known,
+/// it is told FOLLOW first, and is taken home again when somebody else has locked it meanwhile.
+#[test]
+fn home_is_kept_to_the_nose() {
+    let (follow, home) = (packet::follow(GIMBAL), packet::reset(GIMBAL, ResetMode::PitchAndYaw));
+    let told = |millis, command: &COMMAND_LONG_DATA| (millis, MountOutput::Command(command.clone()));
+    for before in [Some(YawMode::Lock), None] {
+        let mut mount = Mount::default();
+        if let Some(mode) = before {
+            mount.note_mode(mode);
+        }
+        assert_eq!(stream(&mut mount, 0, 1_000, Order::Home, READY), [told(0, &follow)], "{before:?}");
+        assert!(mount.handle_outcome(at(1_000), GIMBAL, &follow, ACCEPTED));
+        let then = stream(&mut mount, 1_000, 3_000, Order::Home, READY);
+        assert_eq!(then, [(1_000, MountOutput::ModeTaken), told(1_000, &home)], "{before:?}");
+        assert!(mount.handle_outcome(at(3_000), GIMBAL, &home, ACCEPTED));
+
+        mount.handle_shown_mode(YawMode::Lock);
+        assert_eq!(stream(&mut mount, 3_000, 4_000, Order::Home, READY), [told(3_000, &follow)], "{before:?}");
+        mount.handle_outcome(at(4_000), GIMBAL, &follow, DENIED);
+        let refused = stream(&mut mount, 4_000, 6_050, Order::Home, READY);
+        assert_eq!(refused, [(4_000, MountOutput::ModeRefused), told(6_000, &follow)], "{before:?}");
+        mount.handle_outcome(at(6_050), GIMBAL, &follow, ACCEPTED);
+        let again = stream(&mut mount, 6_050, 8_000, Order::Home, READY);
+        assert_eq!(again, [(6_050, MountOutput::ModeTaken), told(6_050, &home)], "{before:?}");
+    }
+}
+
+/// "leave RETRACT: 31010 p7=1, wait ACK + ec1 bit 0x10, then target" (gimbals 2.5): home is a target as well.
+#[test]
+fn home_is_a_place_to_come_back_to_from_retract() {
+    let mut mount = following();
+    stream(&mut mount, 0, 100, Order::Retract, READY);
+    let is_off = Condition { motors_on: false, ..READY };
+    let on = stream(&mut mount, 1_000, 4_000, Order::Home, is_off);
+    assert_eq!(on, [(1_000, MountOutput::Command(packet::set_motors(GIMBAL, true)))]);
+    let home = packet::reset(GIMBAL, ResetMode::PitchAndYaw);
+    let then = stream(&mut mount, 4_000, 6_000, Order::Home, READY);
+    assert_eq!(then, [(4_000, MountOutput::Command(home))]);
+}
+
 /// "treat HEARTBEAT.system_status ≠ ACTIVE as 'not ready': hold targets" (gimbals 2.5).
 #[test]
 fn what_it_is_told_before_it_is_ready_waits() {
