@@ -67,7 +67,8 @@ Examples:
   gimbald run --config ./gimbald.toml --log debug
   GIMBALD__LINK__GROUND__ENDPOINT=udpout:10.0.0.2:14550 gimbald run
 
-Environment variables named GIMBALD__… override single values of the file. SIGTERM ends the service.")]
+Environment variables named GIMBALD__… override single values of the file. SIGTERM and SIGHUP
+end the service.")]
     Run(ConfigArgs),
 
     /// Say whether the configuration is right, and if not, everything that is wrong with it

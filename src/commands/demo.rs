@@ -67,7 +67,7 @@ enum DemoError {
     Daemon(#[from] supervisor::RunError),
 }
 
-/// Runs until SIGTERM or SIGINT, or until the duration that was asked for is over.
+/// Runs until SIGTERM, SIGINT or SIGHUP, or until the duration that was asked for is over.
 pub fn demo(arguments: &DemoArgs, output: &mut impl Write, errors: &mut impl Write) -> ExitCode {
     match run(arguments, output) {
         Ok(()) => ExitCode::Ok,

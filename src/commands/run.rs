@@ -10,7 +10,7 @@ use crate::exit_code::ExitCode;
 
 use super::check;
 
-/// Runs the daemon until SIGTERM or SIGINT; what is wrong with the configuration goes to `errors`.
+/// Runs the daemon until SIGTERM, SIGINT or SIGHUP; what is wrong with the configuration goes to `errors`.
 pub fn run(arguments: &ConfigArgs, errors: &mut impl Write) -> ExitCode {
     let settings = match config::load(&arguments.config, config::process_environment()) {
         Ok(settings) => settings,

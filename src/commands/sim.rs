@@ -27,7 +27,7 @@ use crate::wire::ids::CapFlags;
 
 const DEFAULT_SLEW_DPS: f64 = 100.0;
 
-/// Runs the simulated peer until SIGTERM or SIGINT.
+/// Runs the simulated peer until SIGTERM, SIGINT or SIGHUP.
 pub fn sim(command: &SimCommand, errors: &mut impl Write) -> ExitCode {
     match command {
         SimCommand::Gimbal(arguments) => run_sim_gimbal(arguments, errors),

@@ -30,7 +30,7 @@ pub enum RunError {
     HttpThread(#[source] io::Error),
 }
 
-/// Runs until SIGTERM or SIGINT.
+/// Runs until SIGTERM, SIGINT or SIGHUP.
 ///
 /// The window runs on a thread of its own, so that no page ever holds up a frame; what becomes of it does not concern
 /// the core.

@@ -46,7 +46,7 @@ pub fn run<P: Peer>(
     })
 }
 
-/// Ready at SIGTERM or SIGINT.
+/// Ready at SIGTERM, SIGINT or SIGHUP.
 pub async fn interrupted() -> io::Result<()> {
     let mut shutdown = Shutdown::new()?;
     poll_fn(|cx| if shutdown.poll(Timestamp::ZERO, cx) { Poll::Ready(Ok(())) } else { Poll::Pending }).await

@@ -181,7 +181,7 @@ fn the_unit_says_what_the_daemon_relies_on() {
     for line in [
         "Type=notify",
         "WatchdogSec=5s",
-        "Restart=on-failure",
+        "Restart=always",
         "RestartPreventExitStatus=64 78",
         "User=gimbald",
         "Group=gimbald",

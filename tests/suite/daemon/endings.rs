@@ -1,11 +1,14 @@
 //! How the process ends, stands still, and starts again.
 
+use std::net::UdpSocket;
 use std::os::unix::net::UnixDatagram;
+use std::process::Command;
 use std::time::Duration;
 
 use gimbald::wire::dialect::{GIMBAL_DEVICE_SET_ATTITUDE_DATA, HEARTBEAT_DATA};
 use gimbald::wire::ids::{GimbalFlags, mav_state};
-use nix::sys::signal::Signal;
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
 
 use super::{one_link, set_pitchyaw, simulated_gimbal, three_links};
 use crate::gimbald::gimbald;
@@ -21,6 +24,16 @@ fn state_of(heard: &Heard) -> Option<u8> {
 /// POWEROFF heartbeat."
 #[test]
 fn sigterm_stops_the_gimbal_and_says_goodbye() {
+    stops_the_gimbal_and_says_goodbye(Signal::SIGTERM);
+}
+
+/// The same of the signal of a terminal that is closed, or to which the line is cut.
+#[test]
+fn sighup_stops_the_gimbal_and_says_goodbye() {
+    stops_the_gimbal_and_says_goodbye(Signal::SIGHUP);
+}
+
+fn stops_the_gimbal_and_says_goodbye(signal: Signal) {
     let site = Site::new();
     let gimbal = simulated_gimbal();
     let _cable = gimbal.plug_in(&site.path("gimbal"));
@@ -37,10 +50,10 @@ fn sigterm_stops_the_gimbal_and_says_goodbye() {
 
     let clock = ground.clock;
     let asked = clock.now();
-    daemon.signal(Signal::SIGTERM);
+    daemon.signal(signal);
     let code = daemon.wait();
 
-    assert_eq!(code, Some(0));
+    assert_eq!(code, Some(0), "{signal}");
     assert!(clock.now().since(asked) < Duration::from_secs(1));
     let is_goodbye = |heard: &Heard| state_of(heard) == Some(mav_state::POWEROFF);
     let mut heard = Vec::new();
@@ -58,6 +71,30 @@ fn sigterm_stops_the_gimbal_and_says_goodbye() {
         GimbalFlags::from_bits_retain(stop.flags) & (GimbalFlags::RETRACT | GimbalFlags::NEUTRAL),
         GimbalFlags::empty()
     );
+}
+
+/// `nohup(1)`: "run a command immune to hangups".
+#[test]
+fn what_ignores_hangups_outlives_its_terminal() {
+    let ground = UdpSocket::bind("127.0.0.1:0").expect("a free port");
+    ground.set_read_timeout(Some(Duration::from_secs(5))).expect("a time-out");
+    let endpoint = format!("udpout:{}", ground.local_addr().expect("it is bound"));
+    let mut peer = Command::new("sh")
+        .args(["-c", "trap '' HUP; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_gimbald"), "sim", "vehicle", "--endpoint"])
+        .arg(endpoint)
+        .spawn()
+        .expect("a shell");
+    let pid = Pid::from_raw(peer.id() as i32);
+    let hear = || ground.recv(&mut [0; 300]).expect("it goes on speaking");
+    hear();
+    kill(pid, Signal::SIGHUP).expect("it runs");
+    for _ in 0..30 {
+        hear();
+    }
+    assert_eq!(peer.try_wait().expect("our child"), None);
+
+    kill(pid, Signal::SIGTERM).expect("it runs");
+    assert_eq!(peer.wait().expect("our child").code(), Some(0));
 }
 
 /// "The adopted id is kept in the state directory and used at once on restart."
