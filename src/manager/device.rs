@@ -23,7 +23,8 @@ impl GimbalManager {
         }
         match report {
             Report::Restarted => {
-                self.forget_demand(now);
+                // What it was told to stop it may not have heard. One that is known to start again is told by its driver.
+                self.forget_demand(now, self.readiness.is_ready() && self.may_be_turning());
                 self.heading_bias = HeadingBias::default();
                 if self.readiness.handle_restarted() {
                     self.tell(Event::Restarted { device: self.device });
@@ -32,7 +33,7 @@ impl GimbalManager {
             Report::Readiness(readiness) => {
                 if readiness == Readiness::Starting {
                     self.pauses.clear();
-                    self.forget_demand(now);
+                    self.forget_demand(now, false);
                 }
                 if self.readiness.handle(readiness) {
                     self.tell(Event::Ready { device: self.device });
@@ -211,10 +212,10 @@ impl GimbalManager {
     }
 
     /// Its setpoint is forgotten. Its clock may have jumped while it goes on turning: then it is stopped.
-    fn forget_demand(&mut self, now: Timestamp) {
-        let was_turning = self.tracking.unstopped().is_some();
+    fn forget_demand(&mut self, now: Timestamp, may_be_turning: bool) {
+        let turns_on = may_be_turning || self.tracking.unstopped().is_some();
         self.tracking.forget();
-        if was_turning {
+        if turns_on {
             self.leave_turning();
             self.stop_what_was_left_turning(now);
         }

@@ -4,6 +4,7 @@ use std::cell::Cell;
 use std::rc::Rc;
 
 use gimbald::wire::dialect::{GIMBAL_MANAGER_STATUS_DATA, MavMessage};
+use gimbald::wire::ids::message;
 use gimbald::wire::target::{MessageShape, message_shape};
 use gimbald::wire::{DatagramFrames, FrameBuffer, MavId, Target};
 
@@ -16,6 +17,8 @@ use super::world::GIMBAL;
 pub struct Cable {
     is_cut: Rc<Cell<bool>>,
     is_deaf: Rc<Cell<bool>>,
+    /// By how much the gimbal's clock is behind, milliseconds.
+    clock_back_ms: Rc<Cell<u32>>,
     /// What the gimbal at its end, which is [`GIMBAL`], is called on this side.
     alias: Rc<Cell<Option<MavId>>>,
 }
@@ -34,6 +37,11 @@ impl Cable {
     pub fn mend(&self) {
         self.is_cut.set(false);
         self.is_deaf.set(false);
+    }
+
+    /// The time since boot that the gimbal tells jumps back, as where a frame that was held up arrives at last.
+    pub fn set_clock_back(&self, millis: u32) {
+        self.clock_back_ms.set(millis);
     }
 
     pub fn rename(&self, id: MavId) {
@@ -57,8 +65,24 @@ impl Interceptor for Cable {
         if self.is_cut.get() {
             return Passage::Lost;
         }
-        self.alias.get().map_or(Passage::Through, |alias| Passage::As(from_gimbal(bytes.to_vec(), alias)))
+        let bytes = with_clock_back(bytes.to_vec(), self.clock_back_ms.get());
+        Passage::As(match self.alias.get() {
+            Some(alias) => from_gimbal(bytes, alias),
+            None => bytes,
+        })
     }
+}
+
+/// The time since boot comes first in both messages that tell where a gimbal looks.
+fn with_clock_back(mut bytes: Vec<u8>, millis: u32) -> Vec<u8> {
+    let frame = DatagramFrames::new(&bytes).next_frame().expect("the gimbal sends whole frames");
+    let tells_time = [message::GIMBAL_DEVICE_ATTITUDE_STATUS, message::MOUNT_ORIENTATION].contains(&frame.message_id());
+    if millis == 0 || !tells_time {
+        return bytes;
+    }
+    let told = u32::from_le_bytes([bytes[10], bytes[11], bytes[12], bytes[13]]);
+    bytes[10..14].copy_from_slice(&told.saturating_sub(millis).to_le_bytes());
+    with_checksum(bytes)
 }
 
 /// What is for `alias` is for the gimbal; what is for the gimbal's own id is for nobody.

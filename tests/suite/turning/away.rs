@@ -119,3 +119,25 @@ fn it_is_stopped_under_the_system_that_told_it_to_turn() {
         flight.assert_rests(&format!("{kind:?}"));
     }
 }
+
+/// A gimbal whose clock jumps back has started again, and stands, or has not: "a rotation is over when the gimbal was told
+/// something else for a second in which it was heard", also where that was said and not heard just before.
+#[test]
+fn what_did_not_hear_its_stop_is_stopped_when_its_clock_has_jumped() {
+    for kind in KINDS {
+        for end in [End::Stop, End::Released] {
+            let what = format!("{kind:?} {end:?}");
+            let mut flight = Flight::turning(kind);
+            flight.cable.cut_towards_gimbal();
+            flight.end_rotation(end);
+            flight.run_for(SECOND / 20);
+            flight.cable.set_clock_back(1_500);
+            flight.run_for(SECOND / 4);
+            flight.cable.mend();
+            flight.run_for(3 * SECOND);
+            flight.assert_rests(&what);
+            flight.run_for(5 * SECOND);
+            assert_eq!(flight.world.stored_turning, Vec::<String>::new(), "{what}");
+        }
+    }
+}
