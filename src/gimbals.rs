@@ -14,8 +14,10 @@ pub mod mavlink_v2;
 pub mod operation;
 pub mod parameters;
 pub mod report;
+pub mod rest_watch;
 pub mod setpoint;
 pub mod settings;
 pub mod signs;
+pub mod told_rates;
 
 pub use driver::{CommandOutcome, DriverOutput, GimbalDriver};

@@ -95,6 +95,7 @@ impl GimbalManager {
                 }
                 self.status = Some((now, status));
                 self.told_attitude = Some(now);
+                self.note_look(now, &status, around.vehicle);
                 if let Some(capabilities) = self.capabilities {
                     let situation = self.situation(now, &capabilities, around);
                     if status.heading.is_some() {

@@ -1,18 +1,18 @@
 //! Whether the gimbal may be turning as it was told, and the word that stops it when there is nobody to decide more.
 //!
 //! A word may be lost. So what was told to turn counts as turning until it was told otherwise for a while in which it was
-//! heard, and what an earlier run, a loss or another dialect left turning is told to stop before anything is known of it:
+//! heard and did not tell that it turns on, and what an earlier run, a loss or another dialect left turning is told to stop before anything is known of it:
 //! that takes no knowledge.
 
 use std::time::Duration;
 
 use super::{DeviceState, GimbalManager, ManagerOutput};
-use crate::gimbals::heard_time::HeardTime;
+use crate::gimbals::report::GimbalStatus;
+use crate::gimbals::rest_watch::{Look, RestWatch};
 use crate::gimbals::setpoint::{Setpoint, Turning};
+use crate::gimbals::told_rates::ToldRates;
 use crate::timestamp::Timestamp;
-
-/// What was told something else than its rotation for so long, and was heard meanwhile, has heard it.
-pub const STOPPED_AFTER: Duration = Duration::from_secs(1);
+use crate::vehicle::Vehicle;
 
 /// A gimbal that was left turning is told so often to stop while it cannot be steered.
 pub const STOP_UNKNOWN_EVERY: Duration = Duration::from_millis(500);
@@ -21,8 +21,10 @@ pub const STOP_UNKNOWN_EVERY: Duration = Duration::from_millis(500);
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rotation {
     turning: Turning,
-    /// For how long it was heard since it is told something else.
-    stopped: Option<HeardTime>,
+    /// All that it was told since it was last known to stand.
+    told: ToldRates,
+    /// Whether it has stopped, since it is told something else.
+    stopped: Option<RestWatch>,
     /// Nobody has told it anything since it was left to itself.
     is_left: bool,
 }
@@ -35,7 +37,8 @@ impl GimbalManager {
 
     /// An earlier run left the gimbal turning: it is told to stop when it is heard.
     pub fn stop_when_heard(&mut self) {
-        self.rotation = Some(Rotation { turning: Turning::STOPPED, stopped: None, is_left: true });
+        let (turning, told) = (Turning::STOPPED, ToldRates::ANY);
+        self.rotation = Some(Rotation { turning, told, stopped: None, is_left: true });
     }
 
     /// It may be one that was told to turn under another id. Whoever steers it tells it something else anyway.
@@ -58,13 +61,21 @@ impl GimbalManager {
         let is_paused = !self.pauses.is_empty();
         let Some(rotation) = self.rotation.as_mut().filter(|rotation| !rotation.is_left) else { return };
         let Some(stopped) = &mut rotation.stopped else { return };
-        if is_paused {
-            *stopped = HeardTime::new(now);
-            return;
-        }
         stopped.handle_heard(now);
-        if stopped.passed() >= STOPPED_AFTER {
+        if is_paused {
+            stopped.begin_anew(now);
+        } else if stopped.is_over(now) {
             self.rotation = None;
+        }
+    }
+
+    /// Its device tells where it looks, and so whether it turns on.
+    pub(super) fn note_look(&mut self, now: Timestamp, status: &GimbalStatus, vehicle: &Vehicle) {
+        let stopped = self.rotation.as_mut().and_then(|rotation| rotation.stopped.as_mut());
+        if let Some(stopped) = stopped.filter(|_| !status.is_assumed) {
+            let angles = status.attitude.angles();
+            let (yaw, heading) = (status.attitude.yaw(), status.heading.or_else(|| vehicle.heading_by_now(now)));
+            stopped.handle_report(now, Look { roll: angles.roll, pitch: angles.pitch, yaw, heading });
         }
     }
 
@@ -130,9 +141,13 @@ impl GimbalManager {
     /// After each event: what the gimbal was told last.
     pub(super) fn note_rotation(&mut self, now: Timestamp) {
         match (self.tracking.unstopped(), &mut self.rotation) {
-            (Some(turning), rotation) => *rotation = Some(Rotation { turning, stopped: None, is_left: false }),
-            (None, Some(rotation)) if !rotation.is_left => {
-                rotation.stopped.get_or_insert(HeardTime::new(now));
+            (Some(turning), rotation) => {
+                let mut told = rotation.map_or(ToldRates::default(), |rotation| rotation.told);
+                told.add(turning);
+                *rotation = Some(Rotation { turning, told, stopped: None, is_left: false });
+            }
+            (None, Some(Rotation { turning, told, stopped, is_left: false })) => {
+                stopped.get_or_insert(RestWatch::new(now, turning.yaw_frame, *told, self.told_attitude));
             }
             (None, _) => {}
         }
@@ -142,7 +157,7 @@ impl GimbalManager {
     /// is to follow that is the driver's.
     pub(super) fn note_operated(&mut self, now: Timestamp) {
         if let Some(stopped) = self.rotation.as_mut().and_then(|rotation| rotation.stopped.as_mut()) {
-            *stopped = HeardTime::new(now);
+            stopped.begin_anew(now);
         }
     }
 

@@ -18,7 +18,6 @@ mod stopping;
 mod streams;
 mod supervision;
 mod telling;
-mod told_rates;
 mod vehicle_turn;
 mod writes;
 
@@ -42,6 +41,7 @@ use crate::gimbals::parameters::{Encoding, Known, ParameterOutput, Parameters};
 use crate::gimbals::report::{GimbalStatus, Identity, Readiness, Report};
 use crate::gimbals::setpoint::{Setpoint, Turning};
 use crate::gimbals::settings::Family;
+use crate::gimbals::told_rates::ToldRates;
 use crate::timers::TimerTable;
 use crate::timestamp::Timestamp;
 use crate::wire::dialect::{COMMAND_ACK_DATA, COMMAND_LONG_DATA, MavMessage};
@@ -57,7 +57,6 @@ use operations::Operations;
 use stopping::Stopping;
 use streams::Streams;
 use supervision::Off;
-use told_rates::ToldRates;
 use vehicle_turn::VehicleTurn;
 
 /// A gimbal not heard for so long is lost: five heartbeats.

@@ -141,3 +141,35 @@ fn what_did_not_hear_its_stop_is_stopped_when_its_clock_has_jumped() {
         }
     }
 }
+
+/// "Its own word that it turns weighs more than that the line is up in one direction": what it is told may not arrive, and while
+/// it tells that it turns on, it does. Then the line is out both ways, or the daemon is killed.
+#[test]
+fn what_tells_that_it_turns_on_is_stopped_when_it_can_hear() {
+    for kind in KINDS {
+        for end in ENDS {
+            for is_killed in [false, true] {
+                let what = format!("{kind:?} {end:?}, killed {is_killed}");
+                let mut flight = Flight::turning(kind);
+                flight.cable.cut_towards_gimbal();
+                flight.end_rotation(end);
+                flight.run_for(4 * SECOND);
+                assert_eq!(flight.world.stored_turning.len(), 1, "{what}: it tells that it turns");
+                if is_killed {
+                    flight.world.kill();
+                    flight.run_for(SECOND / 2);
+                    let left_turning = flight.world.stored_turning.clone();
+                    flight.world.start(Settings { left_turning, ..three_links() });
+                } else {
+                    flight.cable.cut();
+                }
+                flight.run_for(4 * SECOND);
+                flight.cable.mend();
+                flight.run_for(5 * SECOND);
+                flight.assert_rests(&what);
+                flight.run_for(10 * SECOND);
+                assert_eq!(flight.world.stored_turning, Vec::<String>::new(), "{what}");
+            }
+        }
+    }
+}

@@ -4,12 +4,12 @@ use std::time::Duration;
 
 use super::faults::Fault;
 use super::generation::Search;
-use super::told_rates::ToldRates;
 use super::{Generation, GremsyDriver, HandOver, Heard, LOST_AFTER, TICK, Timer, operations};
 use crate::gimbals::driver::{DriverOutput, GimbalDriver};
 use crate::gimbals::gremsy::status::{Activity, SystemStatus};
 use crate::gimbals::operation::OperationError;
 use crate::gimbals::report::{Readiness, Report};
+use crate::gimbals::told_rates::ToldRates;
 use crate::timers::TimerTable;
 use crate::timestamp::Timestamp;
 use crate::wire::dialect::HEARTBEAT_DATA;

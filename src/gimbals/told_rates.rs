@@ -1,4 +1,4 @@
-//! The rates that a Gremsy was told since it was last known to stand.
+//! The rates that a gimbal was told since it was last known to stand.
 //!
 //! Which of them it has heard last is not known while its line is out, so one that turns as any of them says may be turning.
 
