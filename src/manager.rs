@@ -19,6 +19,7 @@ mod autopilot_client;
 mod commands;
 mod demands;
 mod device;
+mod elsewhere;
 mod given;
 mod heading;
 mod inquiries;

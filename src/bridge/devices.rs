@@ -41,9 +41,10 @@ impl Bridge {
             Hearing::Unknown
         };
         let is_heartbeat = frame.message_id() == message::HEARTBEAT;
+        let is_elsewhere = matches!(hearing, Hearing::OffItsLink | Hearing::Elsewhere);
         match hearing {
             Hearing::Device { gimbal, twin } => {
-                gimbal.manager.handle_device_heard(now);
+                gimbal.manager.handle_device_heard(now, place.channel);
                 if !is_answer_to_another(frame, MavId::new(system, gimbal.component)) {
                     gimbal.driver.handle_vehicle_heading(self.vehicle.heading_by_now(now));
                     gimbal.driver.handle_received(now, frame);
@@ -78,6 +79,20 @@ impl Bridge {
                     self.handle_new_device(now, place, role, frame, system);
                 }
             }
+        }
+        if is_elsewhere && role == Role::Gimbal {
+            self.stop_elsewhere(now, place, source);
+        }
+    }
+
+    /// Whoever is heard there under the id of a gimbal that may be turning may be that gimbal. Only we tell it what to do on a
+    /// line of gimbals.
+    fn stop_elsewhere(&mut self, now: Timestamp, place: Place, device: MavId) {
+        let Some(gimbal) = self.roster.iter_mut().find(|gimbal| gimbal.adopted == Some(device)) else { return };
+        let Some(turning) = gimbal.manager.handle_heard_elsewhere(now, place.channel) else { return };
+        let component = gimbal.component;
+        for word in gimbal.driver.words_that_stop(turning) {
+            self.send(now, place.channel.into(), component, &word);
         }
     }
 

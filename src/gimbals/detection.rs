@@ -317,6 +317,10 @@ impl GimbalDriver for Detection {
         }
     }
 
+    fn words_that_stop(&self, turning: Turning) -> Vec<MavMessage> {
+        self.other.as_ref().map_or_else(|| self.v2.words_that_stop(turning), |other| other.words_that_stop(turning))
+    }
+
     fn handle_link_lost(&mut self) {
         self.v2.handle_link_lost();
         if let Some(other) = &mut self.other {

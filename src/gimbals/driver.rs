@@ -4,7 +4,7 @@ use super::details::GimbalDetails;
 use super::operation::{Operation, OperationId, OperationResult};
 use super::parameters::Parameters;
 use super::report::Report;
-use super::setpoint::Setpoint;
+use super::setpoint::{Setpoint, Turning};
 use super::settings::Family;
 use crate::geometry::Angle;
 use crate::timestamp::Timestamp;
@@ -46,6 +46,12 @@ pub trait GimbalDriver: std::fmt::Debug {
     /// to be repeated. `false` where a family has no rotation that outlives what replaces it.
     fn may_be_turning(&self) -> bool {
         false
+    }
+
+    /// What stops it, said at once, also where it has been plugged in besides; nothing where a family has no rotation that
+    /// outlives what replaces it.
+    fn words_that_stop(&self, _turning: Turning) -> Vec<MavMessage> {
+        Vec::new()
     }
 
     /// The family whose words stop it where those of a v2 device do not, by the configuration or as it was found out: the

@@ -6,7 +6,9 @@
 
 use std::time::Duration;
 
+use super::elsewhere::Elsewhere;
 use super::{DeviceState, GimbalManager, ManagerOutput};
+use crate::channel::ChannelId;
 use crate::gimbals::report::GimbalStatus;
 use crate::gimbals::rest_watch::{Look, RestWatch};
 use crate::gimbals::setpoint::{Setpoint, Turning};
@@ -18,7 +20,7 @@ use crate::vehicle::Vehicle;
 pub const STOP_UNKNOWN_EVERY: Duration = Duration::from_millis(500);
 
 /// What the gimbal was told to turn at.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Rotation {
     turning: Turning,
     /// All that it was told since it was last known to stand.
@@ -27,6 +29,7 @@ pub(super) struct Rotation {
     stopped: Option<RestWatch>,
     /// Nobody has told it anything since it was left to itself.
     is_left: bool,
+    elsewhere: Elsewhere,
 }
 
 impl GimbalManager {
@@ -38,7 +41,8 @@ impl GimbalManager {
     /// An earlier run left the gimbal turning: it is told to stop when it is heard.
     pub fn stop_when_heard(&mut self) {
         let (turning, told) = (Turning::STOPPED, ToldRates::ANY);
-        self.rotation = Some(Rotation { turning, told, stopped: None, is_left: true });
+        let elsewhere = self.rotation.take().map_or_else(Elsewhere::default, |before| before.elsewhere);
+        self.rotation = Some(Rotation { turning, told, stopped: None, is_left: true, elsewhere });
     }
 
     /// It may be one that was told to turn under another id. Whoever steers it tells it something else anyway.
@@ -56,17 +60,25 @@ impl GimbalManager {
         self.stop_what_was_left_turning(now);
     }
 
-    /// Its device said something, whatever it was.
-    pub fn handle_device_heard(&mut self, now: Timestamp) {
+    /// Its device said something there, whatever it was.
+    pub fn handle_device_heard(&mut self, now: Timestamp, channel: ChannelId) {
         let is_paused = !self.pauses.is_empty();
-        let Some(rotation) = self.rotation.as_mut().filter(|rotation| !rotation.is_left) else { return };
+        let Some(rotation) = self.rotation.as_mut() else { return };
+        rotation.elsewhere.forget(channel);
         let Some(stopped) = &mut rotation.stopped else { return };
         stopped.handle_heard(now);
         if is_paused {
             stopped.begin_anew(now);
-        } else if stopped.is_over(now) {
+        } else if stopped.is_over(now) && rotation.elsewhere.were_told() {
             self.rotation = None;
         }
+    }
+
+    /// Its id is heard on another line of gimbals, where it may be by now; what it is to be told there, if that is due.
+    pub fn handle_heard_elsewhere(&mut self, now: Timestamp, channel: ChannelId) -> Option<Turning> {
+        let turns = self.tracking.unstopped().is_some();
+        let rotation = self.rotation.as_mut()?;
+        rotation.elsewhere.handle_heard(now, channel, turns).then(|| rotation.turning.stopped())
     }
 
     /// Its device tells where it looks, and so whether it turns on.
@@ -81,7 +93,7 @@ impl GimbalManager {
 
     /// Tells the gimbal to stop turning, whatever is known of it.
     pub fn stop_at_once(&mut self) {
-        let turning = self.rotation.map_or(Turning::STOPPED, |rotation| rotation.turning);
+        let turning = self.rotation.as_ref().map_or(Turning::STOPPED, |rotation| rotation.turning);
         self.outputs.push_back(ManagerOutput::Steer(Setpoint::Turn(turning.stopped())));
     }
 
@@ -142,12 +154,14 @@ impl GimbalManager {
     pub(super) fn note_rotation(&mut self, now: Timestamp) {
         match (self.tracking.unstopped(), &mut self.rotation) {
             (Some(turning), rotation) => {
-                let mut told = rotation.map_or(ToldRates::default(), |rotation| rotation.told);
+                let before = rotation.take().map(|before| (before.told, before.elsewhere));
+                let (mut told, elsewhere) = before.unwrap_or_default();
                 told.add(turning);
-                *rotation = Some(Rotation { turning, told, stopped: None, is_left: false });
+                *rotation = Some(Rotation { turning, told, stopped: None, is_left: false, elsewhere });
             }
-            (None, Some(Rotation { turning, told, stopped, is_left: false })) => {
-                stopped.get_or_insert(RestWatch::new(now, turning.yaw_frame, *told, self.told_attitude));
+            (None, Some(Rotation { turning, told, stopped: stopped @ None, is_left: false, elsewhere })) => {
+                *stopped = Some(RestWatch::new(now, turning.yaw_frame, *told, self.told_attitude));
+                elsewhere.begin_anew(now);
             }
             (None, _) => {}
         }
@@ -168,7 +182,7 @@ impl GimbalManager {
     }
 
     pub(super) fn rotation_due(&self) -> Option<Timestamp> {
-        let is_left = self.rotation.is_some_and(|rotation| rotation.is_left);
+        let is_left = self.rotation.as_ref().is_some_and(|rotation| rotation.is_left);
         self.stop_unknown.filter(|_| is_left && self.is_heard)
     }
 }

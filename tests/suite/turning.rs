@@ -4,6 +4,7 @@
 mod about;
 mod away;
 mod killed;
+mod moved;
 mod renamed;
 mod schedules;
 
@@ -120,11 +121,15 @@ impl Gimbal {
                 Self::Gremsy(Watched::new(gremsy(gremsy::DeviceSettings { firmware, ..v1_gremsy })))
             }
         };
-        match gimbal.clone() {
+        gimbal.plug_in(world, place, &cable);
+        (gimbal, cable)
+    }
+
+    fn plug_in(&self, world: &mut World, place: Place, cable: &Cable) {
+        match self.clone() {
             Self::V2Device(peer) => world.install(place, Intercepted::new(peer, cable.clone())),
             Self::Gremsy(peer) => world.install(place, Intercepted::new(peer, cable.clone())),
         }
-        (gimbal, cable)
     }
 }
 

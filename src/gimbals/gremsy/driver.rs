@@ -27,7 +27,7 @@ use std::time::Duration;
 use super::config::GremsySettings;
 use super::readings::{Encoders, Negated, Orientation, RawImu};
 use super::status::{SystemStatus, read_system_status};
-use crate::geometry::Angle;
+use crate::geometry::{Angle, AngularRate};
 use crate::gimbals::boot_clock::BootClock;
 use crate::gimbals::capabilities::Capabilities;
 use crate::gimbals::details::GimbalDetails;
@@ -423,6 +423,22 @@ impl GimbalDriver for GremsyDriver {
 
     fn stops_as(&self) -> Option<Family> {
         Some(Family::Gremsy)
+    }
+
+    fn words_that_stop(&self, turning: Turning) -> Vec<MavMessage> {
+        let Some(device) = self.device else { return Vec::new() };
+        let in_v1 = MavMessage::COMMAND_LONG(packet::turn_at(device, [AngularRate::ZERO; 3]));
+        let in_v2 = self.v2.words_that_stop(turning).into_iter().map(|word| match word {
+            MavMessage::GIMBAL_DEVICE_SET_ATTITUDE(zero) => {
+                MavMessage::GIMBAL_DEVICE_SET_ATTITUDE(self.in_its_way(zero))
+            }
+            word => word,
+        });
+        match self.search.decided() {
+            Some(Generation::V1) => vec![in_v1],
+            Some(Generation::V2) => in_v2.collect(),
+            None => std::iter::once(in_v1).chain(in_v2).collect(),
+        }
     }
 
     fn may_be_turning(&self) -> bool {

@@ -15,7 +15,7 @@ use crate::gimbals::gremsy;
 use crate::gimbals::operation::{Operation, OperationError, OperationId};
 use crate::gimbals::parameters::Parameters;
 use crate::gimbals::report::{GimbalStatus, Identity, Report};
-use crate::gimbals::setpoint::Setpoint;
+use crate::gimbals::setpoint::{Setpoint, Turning};
 use crate::gimbals::settings::Family;
 use crate::timers::TimerTable;
 use crate::timestamp::Timestamp;
@@ -294,6 +294,11 @@ impl GimbalDriver for MavlinkV2Driver {
         {
             self.send(packet::set_attitude(device, &setpoint));
         }
+    }
+
+    fn words_that_stop(&self, turning: Turning) -> Vec<MavMessage> {
+        let zero = Setpoint::Turn(turning.stopped());
+        self.device.map(|device| packet::set_attitude(device, &zero)).into_iter().collect()
     }
 
     fn handle_command_outcome(&mut self, _now: Timestamp, command: &COMMAND_LONG_DATA, outcome: CommandOutcome) {

@@ -245,10 +245,7 @@ impl GremsyDriver {
 
     /// A setpoint as the driver for v2 devices makes it: roll and pitch are always level here, rates are all numbers, and
     /// firmware that does not know the bits of the yaw frame does not get them.
-    pub(super) fn send_v2_setpoint(&mut self, mut setpoint: GIMBAL_DEVICE_SET_ATTITUDE_DATA) {
-        if self.search.decided() == Some(Generation::V1) {
-            return;
-        }
+    pub(super) fn in_its_way(&self, mut setpoint: GIMBAL_DEVICE_SET_ATTITUDE_DATA) -> GIMBAL_DEVICE_SET_ATTITUDE_DATA {
         let mut flags = GimbalFlags::from_bits_retain(setpoint.flags);
         flags |= GimbalFlags::ROLL_LOCK | GimbalFlags::PITCH_LOCK;
         if !self.tells_yaw_frame() {
@@ -259,7 +256,14 @@ impl GremsyDriver {
         if turns && setpoint.angular_velocity_x.is_nan() {
             setpoint.angular_velocity_x = 0.0;
         }
-        self.outputs.push_back(DriverOutput::Message(Box::new(MavMessage::GIMBAL_DEVICE_SET_ATTITUDE(setpoint))));
+        setpoint
+    }
+
+    pub(super) fn send_v2_setpoint(&mut self, setpoint: GIMBAL_DEVICE_SET_ATTITUDE_DATA) {
+        if self.search.decided() != Some(Generation::V1) {
+            let told = MavMessage::GIMBAL_DEVICE_SET_ATTITUDE(self.in_its_way(setpoint));
+            self.outputs.push_back(DriverOutput::Message(Box::new(told)));
+        }
     }
 
     fn send_mode(&mut self, device: MavId, mode: ControlMode) {
