@@ -22,7 +22,7 @@ use crate::gimbals::driver::{CommandOutcome, DriverOutput, GimbalDriver};
 use crate::gimbals::gremsy;
 use crate::gimbals::operation::{Operation, OperationError, OperationId};
 use crate::gimbals::parameters::Parameters;
-use crate::gimbals::report::{GimbalAttitude, GimbalStatus, Identity, Report};
+use crate::gimbals::report::{GimbalAttitude, GimbalStatus, Identity, Readiness, Report};
 use crate::gimbals::setpoint::{Pointing, RadioControl, Setpoint};
 use crate::gimbals::settings::Family;
 use crate::timers::TimerTable;
@@ -52,8 +52,10 @@ pub struct MavlinkV1Driver {
     settings: V1Settings,
     device: Option<MavId>,
     alive: bool,
-    /// It says that it is ready for angles; what it is told before is kept for it.
+    /// It says that it is ready for angles; what it is told before its first word on that is kept for it.
     ready: bool,
+    /// As it was reported.
+    readiness: Option<Readiness>,
     wanted: Option<MountControl>,
     sent: Option<(Timestamp, MountControl)>,
     configuration: Configuration,
@@ -113,6 +115,7 @@ impl MavlinkV1Driver {
             device: None,
             alive: false,
             ready: false,
+            readiness: None,
             wanted: None,
             sent: None,
             configuration: Configuration::Unknown,
@@ -148,17 +151,27 @@ impl MavlinkV1Driver {
         let state = heartbeat.system_status;
         let ready =
             !matches!(state, mav_state::BOOT | mav_state::CALIBRATING | mav_state::STANDBY | mav_state::POWEROFF);
-        if state == mav_state::BOOT && self.ready {
+        let was_ready = std::mem::replace(&mut self.ready, ready);
+        self.report_readiness();
+        if state == mav_state::BOOT && was_ready {
             self.restart();
         }
-        if ready && !self.ready {
-            self.ready = true;
+        if ready && !was_ready {
             self.send_when_due(now);
         }
         if !ready {
+            // It would do that when it is ready, however long after it was asked for.
+            self.wanted = None;
+            self.timers.cancel(Timer::Send);
             self.obedience.pause();
         }
-        self.ready = ready;
+    }
+
+    fn report_readiness(&mut self) {
+        let readiness = if self.ready { Readiness::Ready } else { Readiness::Starting };
+        if self.readiness.replace(readiness) != Some(readiness) {
+            self.report(Report::Readiness(readiness));
+        }
     }
 
     fn handle_boot_ms(&mut self, boot_ms: u32) {
@@ -294,7 +307,7 @@ impl MavlinkV1Driver {
 
     fn lose(&mut self) {
         self.alive = false;
-        self.ready = false;
+        (self.ready, self.readiness) = (false, None);
         self.clock.forget();
         // Another may come in its place.
         self.says_gremsy = false;
@@ -368,6 +381,9 @@ impl GimbalDriver for MavlinkV1Driver {
     }
 
     fn handle_setpoint(&mut self, now: Timestamp, setpoint: Setpoint) {
+        if self.readiness == Some(Readiness::Starting) {
+            return;
+        }
         self.wanted = Some(match setpoint {
             Setpoint::Retract => MountControl::Retract,
             Setpoint::Neutral => MountControl::Neutral,
@@ -411,6 +427,7 @@ impl GimbalDriver for MavlinkV1Driver {
                 self.parameters.set(now, id, &[(&name, value)]);
                 return self.parameters.drain_into(&mut self.outputs);
             }
+            Operation::RadioControl if self.readiness == Some(Readiness::Starting) => Err(OperationError::NotReady),
             Operation::RadioControl if self.settings.radio_control != V1RadioControl::None => {
                 self.wanted = Some(MountControl::RadioControl);
                 self.send_when_due(now);

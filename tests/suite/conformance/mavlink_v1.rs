@@ -16,14 +16,14 @@ use gimbald::manager::asked::NotDone;
 use gimbald::wire::MavId;
 use gimbald::wire::dialect::{
     COMMAND_LONG_DATA, CharArray, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA,
-    GIMBAL_DEVICE_SET_ATTITUDE_DATA, GIMBAL_MANAGER_SET_PITCHYAW_DATA, MOUNT_ORIENTATION_DATA, MavMessage,
-    PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA,
+    GIMBAL_DEVICE_SET_ATTITUDE_DATA, GIMBAL_MANAGER_SET_PITCHYAW_DATA, HEARTBEAT_DATA, MOUNT_ORIENTATION_DATA,
+    MavMessage, PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA,
 };
 
 use crate::support::script::{
-    ACCEPTED, DENIED, NAN, UNSUPPORTED, ack, autopilot_state, command_long, device_information, device_status,
-    gimbal_heartbeat, ground_heartbeat, of, pitch_yaw_deg, px4_heartbeat, quaternion, request_message, set_pitchyaw,
-    usual_capabilities,
+    ACCEPTED, DENIED, NAN, TEMPORARILY_REJECTED, UNSUPPORTED, ack, autopilot_state, command_long, device_information,
+    device_status, gimbal_heartbeat, ground_heartbeat, of, pitch_yaw_deg, px4_heartbeat, quaternion, request_message,
+    set_pitchyaw, usual_capabilities,
 };
 use crate::support::world::{AUTOPILOT, GCS, GIMBAL, MANAGER, Places, World, heartbeat, three_links};
 
@@ -104,6 +104,38 @@ fn item_176_angles_reach_a_v1_gimbal_in_its_signs() {
         let (mut world, places) = with_gimbal(GimbalSettings { v1, ..v1_gimbal() });
         look(&mut world, places, [-45.0, 30.0], 44.0);
         assert_near(only(told(&mut world, places)), expected);
+    }
+}
+
+/// "What it is told meanwhile it would do when it is ready, long after it was asked for. So it is not told: whoever asks is
+/// refused, and may ask again": of each state in which it is not ready, and of what was asked before that.
+#[test]
+fn nothing_that_is_asked_of_one_that_is_not_ready_is_done_later() {
+    const ACTIVE: u8 = 4;
+    let beat = |world: &mut World, places: Places, system_status: u8| {
+        let MavMessage::HEARTBEAT(usual) = heartbeat(26, 0) else { unreachable!() };
+        world.send(places.gimbal, GIMBAL, &MavMessage::HEARTBEAT(HEARTBEAT_DATA { system_status, ..usual }));
+        report(world, places, 0.0, 0.0);
+        world.run_for(SECOND);
+    };
+    for state in [2, 3, 7] {
+        for rate in [NAN, 20.0] {
+            let what = format!("state {state}, rate {rate}");
+            let (mut world, places) = with_gimbal(v1_gimbal());
+            look(&mut world, places, [-10.0, 20.0], 44.0);
+            world.forget();
+            beat(&mut world, places, state);
+            let angle = if rate.is_nan() { 60.0 } else { NAN };
+            let ask = command_long(MANAGER, 1000, &[NAN, angle, NAN, rate, 44.0, 0.0, 1.0]);
+            assert_eq!(world.result_of(places.ground, GCS, &ask), Some(TEMPORARILY_REJECTED), "{what}");
+            for state in [state, state, ACTIVE, ACTIVE, ACTIVE] {
+                beat(&mut world, places, state);
+            }
+            assert_eq!(told(&mut world, places), [[0.0; 4]; 0], "{what}");
+
+            look(&mut world, places, [-30.0, 5.0], 44.0);
+            assert_near(only(told(&mut world, places)), [-30.0, 0.0, 5.0, 2.0]);
+        }
     }
 }
 

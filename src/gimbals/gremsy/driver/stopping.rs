@@ -1,5 +1,5 @@
-//! Stopping a Gremsy that speaks v2, which answers no setpoint: zeros until it has stopped. One that speaks v1 acknowledges its zeros, which
-//! are sent elsewhere; a copy of an older answer looks the same, so it is watched here as well.
+//! Stopping a Gremsy that speaks v2, which answers no setpoint: zeros until it has stopped. One that speaks v1 acknowledges
+//! its zeros, which are sent elsewhere; a copy of an older answer looks the same, so it is watched here as well.
 
 use std::time::Duration;
 

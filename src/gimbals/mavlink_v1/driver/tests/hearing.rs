@@ -181,7 +181,8 @@ fn a_gimbal_that_was_silent_is_not_found_to_rest_at_once() {
     let mut line = Line::new(Signs::NORMAL, Reports::Nothing);
     let orientation =
         |time_boot_ms| MOUNT_ORIENTATION_DATA { time_boot_ms, roll: 0.0, pitch: 0.0, yaw: 0.0, yaw_absolute: 0.0 };
-    line.run_for(SECOND);
+    // It says ACTIVE with its third heartbeat.
+    line.run_for(SECOND * 21 / 10);
     line.point(-30.0, 0.0);
     let mut boot_ms = 1_000;
     let mut tell = |line: &mut Line, tenths: u32| {
