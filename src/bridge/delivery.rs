@@ -134,7 +134,7 @@ impl Bridge {
     fn handle_heartbeat(&mut self, now: Timestamp, place: Place, role: Role, frame: &Frame<'_>) {
         let source = frame.source();
         let Some(heartbeat) = frame.decode::<HEARTBEAT_DATA>() else { return };
-        self.ranks.handle_heartbeat(now, source, heartbeat.mavtype);
+        self.ranks.handle_heartbeat(source, heartbeat.mavtype);
         if heartbeat.mavtype == mav_type::GCS {
             self.note_station(now, place, frame);
         }

@@ -2,12 +2,10 @@
 //!
 //! Whether a component is a ground station it says itself, in its heartbeat.
 
-use crate::timestamp::Timestamp;
+use std::collections::BTreeMap;
+
 use crate::wire::MavId;
 use crate::wire::ids::mav_type;
-
-/// So many ground stations are remembered; of more, those heard last.
-const MAX_GROUND_STATIONS: usize = 32;
 
 /// How much a component's word counts, the least first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -26,7 +24,9 @@ pub enum Rank {
 #[derive(Clone, Debug, Default)]
 pub struct Ranks {
     own_system: Option<u8>,
-    ground_stations: Vec<(MavId, Timestamp)>,
+    /// By system, which components of it are ground stations. There is room for every id: whoever holds control keeps its rank,
+    /// however many others call themselves ground stations.
+    ground_stations: BTreeMap<u8, [bool; 256]>,
 }
 
 impl Ranks {
@@ -35,29 +35,17 @@ impl Ranks {
     }
 
     /// `id` says in its heartbeat what it is (`MAV_TYPE`).
-    pub fn handle_heartbeat(&mut self, now: Timestamp, id: MavId, kind: u8) {
-        let known = self.ground_stations.iter().position(|(station, _)| *station == id);
-        match (kind == mav_type::GCS, known) {
-            (true, Some(at)) => self.ground_stations[at].1 = now,
-            (true, None) => {
-                if self.ground_stations.len() >= MAX_GROUND_STATIONS {
-                    let oldest = self.ground_stations.iter().enumerate().min_by_key(|(_, (_, heard))| *heard);
-                    if let Some(oldest) = oldest.map(|(at, _)| at) {
-                        self.ground_stations.swap_remove(oldest);
-                    }
-                }
-                self.ground_stations.push((id, now));
-            }
-            (false, Some(at)) => {
-                self.ground_stations.swap_remove(at);
-            }
-            (false, None) => {}
+    pub fn handle_heartbeat(&mut self, id: MavId, kind: u8) {
+        let is_ground_station = kind == mav_type::GCS;
+        if is_ground_station || self.is_ground_station(id) {
+            let components = self.ground_stations.entry(id.system).or_insert([false; 256]);
+            components[usize::from(id.component)] = is_ground_station;
         }
     }
 
     /// Whether `id` said last that it is a ground station.
     pub fn is_ground_station(&self, id: MavId) -> bool {
-        self.ground_stations.iter().any(|(station, _)| *station == id)
+        self.ground_stations.get(&id.system).is_some_and(|components| components[usize::from(id.component)])
     }
 
     /// The rank of `id`, where `autopilot` is our system's.
@@ -91,25 +79,28 @@ mod tests {
         let rank = |ranks: &Ranks, id| ranks.of(id, Some(AUTOPILOT));
         assert_eq!(rank(&ranks, STATION), Rank::Stranger);
 
-        ranks.handle_heartbeat(Timestamp::ZERO, STATION, mav_type::GCS);
-        ranks.handle_heartbeat(Timestamp::ZERO, COMPANION, mav_type::ONBOARD_CONTROLLER);
+        ranks.handle_heartbeat(STATION, mav_type::GCS);
+        ranks.handle_heartbeat(COMPANION, mav_type::ONBOARD_CONTROLLER);
 
         let order = [STATION, AUTOPILOT, COMPANION, MavId::new(8, 1)].map(|id| rank(&ranks, id));
         assert_eq!(order, [Rank::GroundStation, Rank::Autopilot, Rank::OnBoard, Rank::Stranger]);
         assert!(order.is_sorted_by(|higher, lower| higher > lower));
-        ranks.handle_heartbeat(Timestamp::ZERO, STATION, mav_type::ONBOARD_CONTROLLER);
+        ranks.handle_heartbeat(STATION, mav_type::ONBOARD_CONTROLLER);
         assert_eq!(rank(&ranks, STATION), Rank::Stranger, "it is something else");
     }
 
+    /// "Ground station (heartbeat `MAV_TYPE` GCS) > our vehicle's autopilot": also while a crowd of others calls itself that.
     #[test]
-    fn however_many_call_themselves_ground_stations_the_table_is_bounded() {
+    fn however_many_call_themselves_ground_stations_none_loses_its_rank() {
         let mut ranks = Ranks::default();
-        for number in 0..1_000 {
-            let id = MavId::new(number as u8, (number / 256) as u8);
-            ranks.handle_heartbeat(Timestamp::from_millis(number), id, mav_type::GCS);
+        ranks.handle_heartbeat(STATION, mav_type::GCS);
+        for number in 0..=u16::MAX {
+            let [system, component] = number.to_be_bytes();
+            ranks.handle_heartbeat(MavId::new(system, component), mav_type::GCS);
         }
-        assert_eq!(ranks.ground_stations.len(), MAX_GROUND_STATIONS);
-        assert_eq!(ranks.of(MavId::new((999 % 256) as u8, 3), None), Rank::GroundStation, "the latest is known");
-        assert_eq!(ranks.of(MavId::new(0, 0), None), Rank::Stranger, "the first is forgotten");
+        assert_eq!([STATION, AUTOPILOT].map(|id| ranks.of(id, None)), [Rank::GroundStation; 2]);
+
+        ranks.handle_heartbeat(AUTOPILOT, mav_type::ONBOARD_CONTROLLER);
+        assert_eq!([STATION, AUTOPILOT].map(|id| ranks.of(id, None)), [Rank::GroundStation, Rank::Stranger]);
     }
 }

@@ -193,7 +193,7 @@ impl Court {
         let primary = holder.map(|id| Holder { id, since: Timestamp::ZERO, heard: Timestamp::ZERO });
         let mut ranks = Ranks::default();
         ranks.set_own_system(Some(1));
-        ranks.handle_heartbeat(Timestamp::ZERO, GCS, mav_type::GCS);
+        ranks.handle_heartbeat(GCS, mav_type::GCS);
         let control = Control { primary, ..Control::default() };
         Self { now: Timestamp::ZERO, control, takeover: Takeover::Open, open: true, quirk: false, ranks }
     }

@@ -216,7 +216,7 @@ fn around(with: impl FnOnce(Surroundings<'_>)) {
     let vehicle = Vehicle::new();
     let mut ranks = Ranks::default();
     ranks.set_own_system(Some(1));
-    ranks.handle_heartbeat(Timestamp::ZERO, GCS, 6);
+    ranks.handle_heartbeat(GCS, 6);
     with(Surroundings {
         vehicle: &vehicle,
         autopilot: Some(AUTOPILOT),
