@@ -1,12 +1,13 @@
 //! Which frames are a gimbal's, and to which of ours they belong.
 //!
-//! A v2 device is a component of its own: its messages have `gimbal_device_id` 0. Ids 1 to 6 are gimbals without MAVLink
+//! A v2 device is a component of its own: its messages have `gimbal_device_id` 0, or its own component id. Ids 1 to 6 are gimbals without MAVLink
 //! behind the component that speaks, and what it says of them is not about a device of ours.
 
 use super::Bridge;
 use super::conflicts::Conflict;
 use super::roster::{Hearing, NotAdopted, Place, Renamed};
 use super::settings::{FALLBACK_SYSTEM_ID, Role};
+use crate::gimbals::mavlink_v2::packet::WhichGimbal;
 use crate::timestamp::Timestamp;
 use crate::wire::dialect::{GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA, HEARTBEAT_DATA};
 use crate::wire::ids::{mav_type, message};
@@ -177,11 +178,11 @@ fn sign_of(frame: &Frame<'_>) -> Sign {
         }
         _ => None,
     };
-    match device_id {
-        Some(0) => Sign::Device,
-        Some(1..=6) => Sign::OwnGimbal,
+    match device_id.map(|device_id| WhichGimbal::read(device_id, frame.source())) {
+        Some(WhichGimbal::Sender) => Sign::Device,
+        Some(WhichGimbal::BehindSender) => Sign::OwnGimbal,
         // Ids above 6 are not allowed in these messages (protocol notes 1.7): ignored.
-        Some(_) | None => Sign::None,
+        Some(WhichGimbal::Nobody(_)) | None => Sign::None,
     }
 }
 

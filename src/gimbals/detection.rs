@@ -15,6 +15,7 @@ use super::details::GimbalDetails;
 use super::driver::{CommandOutcome, DriverOutput, GimbalDriver};
 use super::families;
 use super::gremsy;
+use super::mavlink_v2::packet::WhichGimbal;
 use super::mavlink_v2::{MavlinkV2Driver, packet};
 use super::operation::{Operation, OperationError, OperationId};
 use super::parameters::Parameters;
@@ -397,8 +398,9 @@ impl GimbalDriver for Detection {
     }
 }
 
-/// Whether only a v2 device says that of itself.
+/// Whether only a v2 device says that of itself. One that names an id that nobody has is no v1 gimbal either.
 fn is_of_v2(frame: &Frame<'_>) -> bool {
-    packet::read_information(frame).is_some_and(|information| information.gimbal_device_id == 0)
-        || packet::read_status(frame).is_some_and(|status| status.gimbal_device_id == 0)
+    let information = packet::read_information(frame).map(|information| information.of);
+    let of = information.or_else(|| packet::read_status(frame).map(|status| status.of));
+    matches!(of, Some(WhichGimbal::Sender | WhichGimbal::Nobody(_)))
 }

@@ -16,7 +16,7 @@ pub mod version;
 pub use driver::GremsyDriver;
 
 use self::parameters::ParameterTable;
-use crate::gimbals::mavlink_v2::packet::read_information;
+use crate::gimbals::mavlink_v2::packet::{WhichGimbal, read_information};
 use crate::gimbals::settings::Family;
 use crate::wire::dialect::{CharArray, MavMessage, PARAM_REQUEST_READ_DATA, PARAM_VALUE_DATA};
 use crate::wire::{Frame, MavId};
@@ -40,7 +40,7 @@ pub fn is_denied_by(frame: &Frame<'_>) -> bool {
 
 /// Who made it, as a v2 device says of itself.
 fn vendor(frame: &Frame<'_>) -> Option<String> {
-    let information = read_information(frame).filter(|information| information.gimbal_device_id == 0)?;
+    let information = read_information(frame).filter(|information| information.of == WhichGimbal::Sender)?;
     Some(information.identity.vendor)
 }
 

@@ -5,7 +5,7 @@ use std::fmt;
 use crate::commands::client::printable_text;
 use crate::gimbals::gremsy;
 use crate::gimbals::gremsy::parameters::ParameterTable;
-use crate::gimbals::mavlink_v2::packet;
+use crate::gimbals::mavlink_v2::packet::{self, WhichGimbal};
 use crate::gimbals::report::Identity;
 use crate::gimbals::settings::Family;
 use crate::wire::dialect::{HEARTBEAT_DATA, PARAM_VALUE_DATA};
@@ -38,8 +38,8 @@ impl Party {
             self.heartbeat = Some((heartbeat.mavtype, heartbeat.autopilot));
         }
         // With another id it is said for a gimbal without MAVLink, by its manager.
-        let information = packet::read_information(frame).filter(|information| information.gimbal_device_id == 0);
-        let tells_attitude = packet::read_status(frame).is_some_and(|status| status.gimbal_device_id == 0);
+        let information = packet::read_information(frame).filter(|information| information.of == WhichGimbal::Sender);
+        let tells_attitude = packet::read_status(frame).is_some_and(|status| status.of == WhichGimbal::Sender);
         self.is_gimbal_device |= information.is_some() || tells_attitude;
         self.tells_v2_attitude |= tells_attitude;
         if let Some(information) = information {

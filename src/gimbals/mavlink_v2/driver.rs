@@ -5,7 +5,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use super::packet::{self, DeviceStatus};
+use super::packet::{self, DeviceStatus, WhichGimbal};
 use crate::geometry::Angle;
 use crate::gimbals::boot_clock::BootClock;
 use crate::gimbals::capabilities::Capabilities;
@@ -39,6 +39,13 @@ const SAYS_NOTHING_OF_ITSELF: &str = "it is heard, and tells neither what it is 
     (GIMBAL_DEVICE_ATTITUDE_STATUS), so that it cannot be steered. Check that what is sent arrives there. If it does, this is \
     no device of gimbal protocol v2: leave its family out of the configuration, and it is found out";
 
+fn says_wrong_id(id: u8) -> String {
+    format!(
+        "it tells what it is and where it looks (GIMBAL_DEVICE_INFORMATION and GIMBAL_DEVICE_ATTITUDE_STATUS) of a gimbal with the \
+         gimbal_device_id {id}, which no gimbal has, so that nothing of it counts. Have its firmware say 0 there, or its own component id"
+    )
+}
+
 /// The first requests go to everybody, as the guide has it; then to the one device heard.
 const BROADCAST_REQUESTS: u32 = 2;
 
@@ -53,6 +60,12 @@ const LEAST_STATUS_RATE_HZ: u32 = 5;
 const WANTED_STATUS_INTERVAL: Duration = Duration::from_millis(100);
 const RATE_REQUESTS: u8 = 3;
 
+#[derive(Clone, Copy, Debug, Default)]
+struct Clocks {
+    of_information: BootClock,
+    of_status: BootClock,
+}
+
 /// Drives one v2 gimbal device.
 #[derive(Debug, Default)]
 pub struct MavlinkV2Driver {
@@ -61,12 +74,15 @@ pub struct MavlinkV2Driver {
     /// Something was said of its capabilities: by itself, or by our patience.
     known: bool,
     informed: bool,
+    /// It tells of a gimbal with this id, which is neither its own nor that of any other.
+    wrong_id: Option<u8>,
     first_status: Option<Timestamp>,
     asking_since: Timestamp,
     requests: u32,
     /// When it was or will be asked because it seemed to have been restarted.
     asked_on_restart: Option<Timestamp>,
-    clock: BootClock,
+    /// The clocks by which it stamps 283 and 285: they are not the same in every device.
+    clocks: Clocks,
     statuses_in_window: u32,
     /// How often 285 may still be asked for.
     rate_requests_left: u8,
@@ -122,8 +138,12 @@ impl MavlinkV2Driver {
         self.timers.set(Timer::AskInformation, now);
     }
 
-    fn handle_boot_time(&mut self, now: Timestamp, boot_ms: u32) {
-        if self.clock.handle_time(boot_ms) {
+    fn handle_boot_time(&mut self, now: Timestamp, of: fn(&mut Clocks) -> &mut BootClock, boot_ms: u32) {
+        let clock = of(&mut self.clocks);
+        if clock.handle_time(boot_ms) {
+            // The other one shows the same restart, and is told it once.
+            self.clocks = Clocks::default();
+            of(&mut self.clocks).handle_time(boot_ms);
             self.fills_delta_yaw = false;
             self.rate_requests_left = RATE_REQUESTS;
             self.parameters.handle_restart();
@@ -140,12 +160,21 @@ impl MavlinkV2Driver {
         }
     }
 
+    fn is_of_itself(&mut self, of: WhichGimbal) -> bool {
+        match of {
+            WhichGimbal::Sender => self.wrong_id = None,
+            WhichGimbal::Nobody(id) => self.wrong_id = Some(id),
+            WhichGimbal::BehindSender => {}
+        }
+        of == WhichGimbal::Sender
+    }
+
     fn handle_information(&mut self, now: Timestamp, frame: &Frame<'_>) {
         let Some(information) = packet::read_information(frame) else { return };
-        if information.gimbal_device_id != 0 {
+        if !self.is_of_itself(information.of) {
             return;
         }
-        self.handle_boot_time(now, information.boot_ms);
+        self.handle_boot_time(now, |clocks| &mut clocks.of_information, information.boot_ms);
         self.informed = true;
         self.timers.cancel(Timer::AskInformation);
         self.timers.cancel(Timer::UseWithoutInformation);
@@ -161,10 +190,10 @@ impl MavlinkV2Driver {
 
     fn handle_status(&mut self, now: Timestamp, frame: &Frame<'_>) {
         let Some(status) = packet::read_status(frame) else { return };
-        if status.gimbal_device_id != 0 {
+        if !self.is_of_itself(status.of) {
             return;
         }
-        self.handle_boot_time(now, status.boot_ms);
+        self.handle_boot_time(now, |clocks| &mut clocks.of_status, status.boot_ms);
         self.statuses_in_window += 1;
         if self.first_status.is_none() && !self.informed {
             self.first_status = Some(now);
@@ -240,7 +269,7 @@ impl MavlinkV2Driver {
 
     fn lose(&mut self) {
         self.alive = false;
-        self.clock.forget();
+        self.clocks = Clocks::default();
         self.parameters.forget();
         for timer in [Timer::AskInformation, Timer::UseWithoutInformation, Timer::CheckRate] {
             self.timers.cancel(timer);
@@ -353,10 +382,11 @@ impl GimbalDriver for MavlinkV2Driver {
 
     fn details(&self, _now: Timestamp) -> GimbalDetails {
         let gremsy = self.says_gremsy.then(|| gremsy::wrong_family(Family::MavlinkV2));
-        let is_silent = self.alive && !self.known && self.requests >= SILENT_AFTER_REQUESTS;
+        let wrong_id = self.wrong_id.filter(|_| self.alive);
+        let is_silent = self.alive && !self.known && wrong_id.is_none() && self.requests >= SILENT_AFTER_REQUESTS;
         let silent = is_silent.then(|| SAYS_NOTHING_OF_ITSELF.to_owned());
         GimbalDetails {
-            faults: gremsy.into_iter().chain(silent).collect(),
+            faults: gremsy.into_iter().chain(silent).chain(wrong_id.map(says_wrong_id)).collect(),
             parameters: self.parameters.by_name(),
             ..GimbalDetails::default()
         }

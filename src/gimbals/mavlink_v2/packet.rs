@@ -25,6 +25,29 @@ use crate::wire::{Frame, MavId, Target};
 /// Payload bytes of 285 before its extension fields.
 const STATUS_BASE_LEN: usize = 40;
 
+/// Of which gimbal 283 or 285 tells, by its `gimbal_device_id`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WhichGimbal {
+    /// The component that sends it: 0, or against the rule its own component id, which can only mean itself.
+    Sender,
+    /// A gimbal without MAVLink behind it, 1 to 6.
+    BehindSender,
+    /// None: there is no such id.
+    Nobody(u8),
+}
+
+impl WhichGimbal {
+    /// What `gimbal_device_id` means in a message from `sender`.
+    pub fn read(gimbal_device_id: u8, sender: MavId) -> Self {
+        match gimbal_device_id {
+            0 => Self::Sender,
+            1..=6 => Self::BehindSender,
+            id if id == sender.component => Self::Sender,
+            id => Self::Nobody(id),
+        }
+    }
+}
+
 /// 283, decoded.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DeviceInformation {
@@ -32,8 +55,8 @@ pub struct DeviceInformation {
     pub boot_ms: u32,
     pub identity: Identity,
     pub capabilities: Capabilities,
-    /// 0 when the device is a component of its own.
-    pub gimbal_device_id: u8,
+    /// Of which gimbal it tells that.
+    pub of: WhichGimbal,
 }
 
 /// Reads 283; `None` for another message.
@@ -67,7 +90,7 @@ pub fn read_information(frame: &Frame<'_>) -> Option<DeviceInformation> {
             retract_cuts_motors: false,
             radio_control_untold: false,
         },
-        gimbal_device_id: message.gimbal_device_id,
+        of: WhichGimbal::read(message.gimbal_device_id, frame.source()),
     })
 }
 
@@ -97,8 +120,8 @@ pub struct DeviceStatus {
     pub delta_yaw: Option<Angle>,
     /// The frame was long enough to carry the extension fields.
     pub extended: bool,
-    /// 0 when the device is a component of its own.
-    pub gimbal_device_id: u8,
+    /// Of which gimbal it tells that.
+    pub of: WhichGimbal,
 }
 
 /// Reads 285; `None` for another message.
@@ -119,7 +142,7 @@ pub fn read_status(frame: &Frame<'_>) -> Option<DeviceStatus> {
         failures: FailureFlags::from_bits_retain(message.failure_flags),
         delta_yaw: message.delta_yaw.is_finite().then(|| Angle::from_radians(f64::from(message.delta_yaw)).wrapped()),
         extended: frame.payload().len() > STATUS_BASE_LEN,
-        gimbal_device_id: message.gimbal_device_id,
+        of: WhichGimbal::read(message.gimbal_device_id, frame.source()),
     })
 }
 

@@ -7,8 +7,9 @@ use gimbald::gimbals::settings::{Family, GimbalSettings};
 use gimbald::timestamp::Timestamp;
 use gimbald::wire::MavId;
 use gimbald::wire::dialect::{
-    COMMAND_LONG_DATA, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_SET_ATTITUDE_DATA,
-    GIMBAL_MANAGER_INFORMATION_DATA, GIMBAL_MANAGER_STATUS_DATA, HEARTBEAT_DATA, MavMessage,
+    COMMAND_LONG_DATA, GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA,
+    GIMBAL_DEVICE_SET_ATTITUDE_DATA, GIMBAL_MANAGER_INFORMATION_DATA, GIMBAL_MANAGER_STATUS_DATA, HEARTBEAT_DATA,
+    MavMessage,
 };
 
 use crate::support::script::{
@@ -246,6 +247,45 @@ fn items_32_and_33_an_attitude_of_another_gimbal_is_not_taken_for_ours() {
     }
 }
 
+/// Protocol notes 1.7: "Device identity = gimbal_device_id == 0 ? source compid : gimbal_device_id. Values above 6 are invalid". The
+/// sender's own component id names itself all the same; any other is named, and nobody is taken for a v1 gimbal for it.
+#[test]
+fn item_33_a_gimbal_that_names_itself_by_its_component_id_is_that_gimbal() {
+    for family in [Family::Auto, Family::MavlinkV2] {
+        for (gimbal_device_id, is_itself) in [(0, true), (154, true), (155, false), (255, false)] {
+            let entry = GimbalSettings { family, ..GimbalSettings::found("camera".to_owned()) };
+            let (mut world, places) = World::empty(Settings { gimbals: vec![entry], ..three_links() });
+            let information = GIMBAL_DEVICE_INFORMATION_DATA {
+                gimbal_device_id,
+                ..device_information(Timestamp::ZERO, usual_capabilities())
+            };
+            let status = GIMBAL_DEVICE_ATTITUDE_STATUS_DATA {
+                gimbal_device_id,
+                ..device_status(Timestamp::ZERO, 44, -20.0, 0.0)
+            };
+            let says = [
+                (SECOND, places.gimbal, GIMBAL, gimbal_heartbeat()),
+                (SECOND, places.gimbal, GIMBAL, MavMessage::GIMBAL_DEVICE_INFORMATION(information)),
+                (SECOND / 10, places.gimbal, GIMBAL, MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status)),
+            ];
+
+            world.run_with(30 * SECOND, &says);
+
+            let result = if is_itself { ACCEPTED } else { TEMPORARILY_REJECTED };
+            assert_eq!(world.result_of(places.ground, GCS, &down()), Some(result), "{family:?} {gimbal_device_id}");
+            let gimbal = &world.snapshot().gimbals[0];
+            let pitch = gimbal.attitude.pitch_deg.map(f64::round);
+            assert_eq!((gimbal.family.as_str(), pitch), ("mavlink_v2", is_itself.then_some(-20.0)));
+            let wrong = format!(
+                "it tells what it is and where it looks (GIMBAL_DEVICE_INFORMATION and GIMBAL_DEVICE_ATTITUDE_STATUS) of a gimbal \
+                 with the gimbal_device_id {gimbal_device_id}, which no gimbal has, so that nothing of it counts. Have its firmware \
+                 say 0 there, or its own component id"
+            );
+            assert_eq!(gimbal.details.faults, if is_itself { vec![] } else { vec![wrong] });
+        }
+    }
+}
+
 /// "When neither heartbeat nor 285 of the device arrives for 3 s, the device is lost: set-point streaming stops, status
 /// CRITICAL, HTTP reports lost."
 #[test]
@@ -304,6 +344,53 @@ fn item_35_a_gimbal_that_seems_to_restart_all_the_time_is_asked_once_a_second() 
     world.run_with(Duration::from_millis(9_500), &both);
 
     assert_eq!(information_requests(&world.take(places.gimbal)).len(), 10);
+}
+
+/// Protocol checklist 35, "time_boot_ms jumps back by > 1 s": by the clock of the same message. Not every device stamps 283 by
+/// the one of its 285, and who is asked what it is goes on with what it was told.
+#[test]
+fn item_35_another_clock_in_283_is_no_restart() {
+    type Clock = fn(u32) -> u32;
+    let clocks: [Clock; 5] =
+        [|millis| millis, |_| 0, |_| 7, |millis| millis + 1_790_000_000, |millis| millis.wrapping_mul(1_000)];
+    for of_information in clocks {
+        let (mut world, places) = World::empty(three_links());
+        let tell = |world: &mut World, millis: u32, what: &[u32]| {
+            let stamp = |millis: u32| Timestamp::from_millis(millis.into());
+            for message in what {
+                let message = match *message {
+                    283 => MavMessage::GIMBAL_DEVICE_INFORMATION(device_information(
+                        stamp(of_information(millis)),
+                        usual_capabilities(),
+                    )),
+                    _ => MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(device_status(stamp(millis), 44, 0.0, 0.0)),
+                };
+                world.send(places.gimbal, GIMBAL, &message);
+                world.run_for(SECOND / 10);
+            }
+        };
+        let restarts =
+            |world: &World| world.snapshot().events.iter().filter(|event| event.what == "gimbal_restarted").count();
+        let mode = |world: &World| world.snapshot().gimbals[0].setpoint.as_ref().map(|told| told.mode.clone());
+        tell(&mut world, 4_000_000, &[283, 285]);
+        assert_eq!(world.result_of(places.ground, GCS, &down()), Some(ACCEPTED));
+
+        tell(&mut world, 4_001_000, &[285, 283, 285, 283, 283, 285]);
+
+        assert_eq!((mode(&world).as_deref(), restarts(&world)), (Some("angle"), 0));
+
+        // One that is a restart may show in both, and counts once: what is asked after it stays.
+        let is_one_clock = of_information(1_000) == 1_000;
+        for order in [[285, 283], [283, 285]].into_iter().filter(|order| order[0] == 285 || is_one_clock) {
+            let (before, at) = (restarts(&world), if order[0] == 285 { 2_000_000 } else { 1_000_000 });
+            tell(&mut world, at, &order[..1]);
+            assert_eq!(world.result_of(places.ground, GCS, &down()), Some(ACCEPTED));
+            tell(&mut world, at + 1_000, &order[1..]);
+            tell(&mut world, at + 2_000, &[285, 283]);
+            assert_eq!((mode(&world).as_deref(), restarts(&world) <= before + 1), (Some("angle"), true), "{order:?}");
+        }
+        assert!(restarts(&world) >= 1);
+    }
 }
 
 /// "When failure_flags has 256 (calibration), command 1000 is answered TEMPORARILY_REJECTED and CONFIGURE still
