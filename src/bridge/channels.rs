@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::LinkIndex;
 use super::outbox::Outbox;
-use super::pacing::{Departure, Origin, SerialQueue};
+use super::pacing::{Departure, Origin, Priority, SerialQueue, classify};
 use super::rates::RateLimits;
 use super::sent::SentFrames;
 use super::settings::{LinkSettings, Role, Transport};
@@ -280,10 +280,15 @@ impl Channels {
         }
     }
 
-    /// Gives a frame of our own out on `wanted`, numbered for each channel; where it comes too soon, when it is its turn.
+    /// Gives a frame of our own out on `wanted`, numbered for each channel; where it comes too soon, when it is its turn. What
+    /// steers a gimbal does not come too soon: it may be the word that stops it.
     pub fn transmit_own(&mut self, now: Timestamp, wanted: ChannelSet, frame: &Frame<'_>, outbox: &mut Outbox) {
+        let limited = match classify(frame, Origin::Own).0 {
+            Priority::OwnControl => ChannelSet::EMPTY,
+            Priority::Control | Priority::Addressed | Priority::Broadcast => self.limited,
+        };
         for channel in wanted.intersection(self.open) {
-            if self.limited.contains(channel) && !self.admit(now, channel, frame) {
+            if limited.contains(channel) && !self.admit(now, channel, frame) {
                 self.hold(channel, frame);
             } else {
                 self.depart(now, channel, frame, outbox);

@@ -2,10 +2,14 @@
 
 use gimbald::bridge::Input;
 use gimbald::bridge::settings::LinkSettings;
-use gimbald::wire::dialect::{GIMBAL_MANAGER_INFORMATION_DATA, GIMBAL_MANAGER_STATUS_DATA, HEARTBEAT_DATA};
+use gimbald::wire::dialect::{
+    GIMBAL_DEVICE_SET_ATTITUDE_DATA, GIMBAL_MANAGER_INFORMATION_DATA, GIMBAL_MANAGER_STATUS_DATA, HEARTBEAT_DATA,
+};
 
 use super::*;
-use crate::support::script::{command_long, gimbal_heartbeat, of, request_message, set_interval, take_control};
+use crate::support::script::{
+    command_long, gimbal_heartbeat, of, pitchyaw, request_message, set_interval, take_control,
+};
 use crate::support::world::{Arrival, GCS, GIMBAL, Places, three_links};
 
 const SECOND: Duration = Duration::from_secs(1);
@@ -88,6 +92,28 @@ fn what_was_asked_for_is_not_limited_in_rate() {
         assert_eq!(of::<GIMBAL_MANAGER_INFORMATION_DATA>(&answers).len(), 1);
         world.run_for(SECOND / 2);
     }
+}
+
+/// "On change of owner, loss of lease, stop and SIGTERM zero is sent at once" (D7): how often a link gets a message is nothing that
+/// may keep a gimbal from being stopped.
+#[test]
+fn what_steers_a_gimbal_is_not_limited_in_rate() {
+    let mut settings = three_links();
+    settings.links[1].max_rates.extend([(284, 100 * SECOND), (285, 100 * SECOND)]);
+    let (mut world, places) = World::with_one_gimbal(settings);
+    let told = |world: &mut World| -> Vec<f32> {
+        let told: Vec<GIMBAL_DEVICE_SET_ATTITUDE_DATA> = world.take_messages(places.gimbal);
+        told.iter().map(|told| told.angular_velocity_z).collect()
+    };
+    let rate = |rate: f32| pitchyaw(f32::NAN, f32::NAN, 0.0, rate, 44.0);
+    assert_eq!(world.result_of(places.ground, GCS, &rate(10.0)), Some(0));
+    world.run_for(SECOND);
+    let turning = told(&mut world);
+    assert!(turning.len() >= 20 && turning.iter().all(|rate| *rate > 0.1), "{turning:?}");
+
+    assert_eq!(world.result_of(places.ground, GCS, &rate(0.0)), Some(0));
+    assert_eq!(told(&mut world), [0.0], "at once");
+    assert!(!world.snapshot().links[1].dropped.contains_key("max_rate"));
 }
 
 /// A goodbye is said at once.
