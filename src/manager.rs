@@ -115,6 +115,8 @@ pub struct GimbalManager {
     state: DeviceState,
     /// It is lost because it was told to shut down.
     is_shut_down: bool,
+    /// Its driver holds back what it is told.
+    is_held_back: bool,
     identity: Identity,
     capabilities: Option<Capabilities>,
     readiness: ReadinessWatch,
@@ -176,6 +178,7 @@ impl GimbalManager {
             device: None,
             state: DeviceState::Searching,
             is_shut_down: false,
+            is_held_back: false,
             identity: Identity::default(),
             capabilities: None,
             readiness: ReadinessWatch::default(),
@@ -372,6 +375,7 @@ impl GimbalManager {
             measured: status,
             heading: self.heading_bias.heading(status.and_then(|status| status.heading), around.vehicle.heading(now)),
             position: around.vehicle.position(now),
+            is_held_back: self.is_held_back,
             capabilities,
             accepts_earth_yaw: self.status.is_some_and(|(_, status)| status.accepts_earth_yaw),
             device_yaw_frame: self.settings.device_yaw_frame,

@@ -25,6 +25,8 @@ pub enum Report {
     Attitude(GimbalStatus),
     /// Whether one that is known can be steered at this moment. One whose driver never says so can.
     Readiness(Readiness),
+    /// Whether what it is told is held back, and only the latest of it is sent in the end.
+    HeldBack(bool),
     /// Nothing that it was told before turns it any more, whatever it may have missed.
     Stands,
     /// Something is wrong with it that the pilot ought to know, in a few words; each is told once.

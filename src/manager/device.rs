@@ -15,11 +15,12 @@ use crate::wire::ids::{CommandResult, FailureFlags};
 impl GimbalManager {
     /// News from the driver.
     pub fn handle_report(&mut self, now: Timestamp, report: Report, around: Surroundings<'_>) {
-        if !matches!(report, Report::Attitude(_) | Report::Malformed { .. } | Report::Fault(_)) {
+        if !matches!(report, Report::Attitude(_) | Report::HeldBack(_) | Report::Malformed { .. } | Report::Fault(_)) {
             self.last_command = None;
         }
         if matches!(report, Report::Restarted | Report::AnotherFamily | Report::Lost | Report::ShutDown) {
             self.pauses.clear();
+            self.is_held_back = false;
         }
         match report {
             Report::Restarted => {
@@ -40,6 +41,7 @@ impl GimbalManager {
                 }
                 self.stop_what_was_left_turning(now);
             }
+            Report::HeldBack(is_held_back) => self.is_held_back = is_held_back,
             Report::Stands => self.forget_rotation(),
             Report::Alive { device } => {
                 if self.device != Some(device) {

@@ -21,7 +21,7 @@ use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 use aim::Aim;
 pub use motion::SETTLE;
-use motion::{Point, Turn, clamp_yaw, way};
+use motion::{Point, Turn, clamp_pitch, clamp_yaw, way};
 use nudge::Nudge;
 use roi::Roi;
 use situation::Pose;
@@ -361,26 +361,28 @@ impl Tracking {
                     let turning = turn.turning;
                     self.aim = Aim::Point(Point::still(pose, turning.yaw_frame, turning.stabilised));
                 } else if situation.device_frame(turn.turning.yaw_frame) != turn.turning.yaw_frame
+                    && situation.heading.is_some()
                     && let Some(pose) = unnudged(turn.turning.yaw_frame)
                 {
-                    // The device has ceased to take this frame: we turn its angles.
+                    // The device has ceased to take this frame: we turn its angles. Without a heading it is told to stop.
                     self.aim = Aim::Point(turn.in_angles(pose));
                 }
             }
             Aim::Point(point) => {
                 let limits = &situation.capabilities.limits;
                 let straight = |from, to| to - from;
-                let frame = point.frame;
+                let (frame, from) = (point.frame, point.pitch.at);
                 let way = |from, to| way(from, to, frame, situation);
                 // What it cannot be told it does not do meanwhile, and would do all at once later.
-                let can_be_told = situation.device_frame(frame) == frame || situation.heading.is_some();
+                let has_frame = situation.device_frame(frame) == frame || situation.heading.is_some();
+                let can_be_told = has_frame && !situation.is_held_back;
                 let passed = if can_be_told { passed } else { Duration::ZERO };
                 let measured = unnudged(frame);
                 let [roll, pitch, yaw] =
                     [measured.map(|pose| pose.roll), measured.map(|pose| pose.pitch), measured.map(|pose| pose.yaw)];
                 let timed_out = [
                     point.roll.carry_on(now, passed, roll, straight, |angle| limits.clamp_roll(angle)),
-                    point.pitch.carry_on(now, passed, pitch, straight, |angle| limits.clamp_pitch(angle)),
+                    point.pitch.carry_on(now, passed, pitch, straight, |angle| clamp_pitch(angle, from, situation)),
                     point.yaw.carry_on(now, passed, yaw, way, |angle| clamp_yaw(angle, frame, situation)),
                 ];
                 if timed_out.contains(&true) {

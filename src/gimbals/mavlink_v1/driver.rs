@@ -280,6 +280,7 @@ impl MavlinkV1Driver {
         }
         if !matches!(self.configuration, Configuration::UnderWay(_)) {
             self.configuration = Configuration::UnderWay(mode);
+            self.report(Report::HeldBack(true));
             self.outputs.push_back(DriverOutput::Command(Box::new(packet::mount_configure(device, mode))));
         }
         false
@@ -413,6 +414,7 @@ impl GimbalDriver for MavlinkV1Driver {
             tracing::debug!(mode, ?outcome, "the gimbal was not configured");
         }
         self.configuration = Configuration::Done(mode);
+        self.report(Report::HeldBack(false));
         self.send_when_due(now);
     }
 

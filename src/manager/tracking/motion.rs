@@ -176,6 +176,19 @@ impl Axis {
     }
 }
 
+/// Keeps a moving pitch within the end stops. Where none are known it ends straight down and straight up: what is told of a
+/// camera beyond is the direction behind it, upside down.
+pub(super) fn clamp_pitch(angle: Angle, from: Angle, situation: &Situation<'_>) -> Angle {
+    let limits = &situation.capabilities.limits;
+    if limits.pitch.is_some() {
+        return limits.clamp_pitch(angle);
+    }
+    let straight = Angle::from_degrees(90.0);
+    // One that was asked to look beyond comes back from there.
+    let reach = if from.abs() > straight { from.abs() } else { straight };
+    angle.clamp(-reach, reach)
+}
+
 /// Keeps a moving yaw within the end stops, which are the vehicle's also while North is held.
 pub(super) fn clamp_yaw(angle: Angle, frame: YawFrame, situation: &Situation<'_>) -> Angle {
     let Some(limits) = situation.capabilities.limits.yaw else { return angle };

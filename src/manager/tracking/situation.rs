@@ -16,6 +16,8 @@ pub struct Situation<'a> {
     pub heading: Option<Angle>,
     /// The vehicle's position, if it is fresh.
     pub position: Option<Position>,
+    /// What the gimbal is told does not reach it yet.
+    pub is_held_back: bool,
     pub capabilities: &'a Capabilities,
     pub accepts_earth_yaw: bool,
     pub device_yaw_frame: DeviceYawFrame,

@@ -535,3 +535,41 @@ fn a_gimbal_that_wants_it_is_configured_first() {
     world.send(places.gimbal, GIMBAL, &MavMessage::COMMAND_ACK(ack(MANAGER, 204, ACCEPTED)));
     assert_near(only(told(&mut world, places)), [-40.0, 0.0, 10.0, 2.0]);
 }
+
+/// D9: "the start of every ramp, are the measured attitude": while the gimbal has not answered that it is configured, a rate turns
+/// nothing that it would have to make up for at once, and one that has ended by then moves nothing any more.
+#[test]
+fn a_rate_begins_when_the_gimbal_is_configured_or_does_without() {
+    let v1 = V1Settings { configures: true, ..V1Settings::default() };
+    let rate = |rate: f32| command_long(MANAGER, 1000, &[NAN, NAN, 0.0, rate, 44.0, 0.0, 1.0]);
+    let standing = |world: &mut World, places: Places, times: u32| {
+        for _ in 0..times {
+            report(world, places, -20.0, 5.0);
+            world.run_for(SECOND / 10);
+        }
+    };
+    for (answers, ends) in [(true, false), (false, false), (false, true)] {
+        let (mut world, places) = with_gimbal(GimbalSettings { v1, ..v1_gimbal() });
+        report(&mut world, places, -20.0, 5.0);
+        assert_eq!(world.result_of(places.ground, GCS, &rate(30.0)), Some(ACCEPTED));
+        standing(&mut world, places, 10);
+        if ends {
+            assert_eq!(world.result_of(places.ground, GCS, &rate(0.0)), Some(ACCEPTED));
+        }
+        standing(&mut world, places, 4);
+        let sent: Vec<COMMAND_LONG_DATA> = world.take_messages(places.gimbal);
+        assert!(sent.iter().all(|sent| sent.command == 204), "{sent:?}");
+
+        if answers {
+            world.send(places.gimbal, GIMBAL, &MavMessage::COMMAND_ACK(ack(MANAGER, 204, ACCEPTED)));
+        } else {
+            world.run_for(SECOND / 5);
+        }
+        let first = told(&mut world, places)[0];
+        assert_near(first, [-20.0, 0.0, 5.0, 2.0]);
+        standing(&mut world, places, 5);
+        let last = *told(&mut world, places).last().expect("it is told on");
+        let turned = if ends { 5.0..=5.01 } else { 17.0..=27.0 };
+        assert!(turned.contains(&last[2]), "{answers} {ends}: {last:?}");
+    }
+}

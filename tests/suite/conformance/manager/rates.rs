@@ -2,16 +2,20 @@
 
 use std::time::Duration;
 
+use gimbald::bridge::settings::Settings;
+use gimbald::gimbals::settings::{DeviceYawFrame, GimbalSettings};
+use gimbald::timestamp::Timestamp;
 use gimbald::wire::MavId;
-use gimbald::wire::dialect::{GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, MavMessage};
+use gimbald::wire::dialect::{GIMBAL_DEVICE_ATTITUDE_STATUS_DATA, GIMBAL_DEVICE_INFORMATION_DATA, MavMessage};
 
 use super::frames::turn_vehicle;
 use super::{
     COMPANION, SECOND, Setpoint, assert_near, is_nan, look, only_setpoint, run_looking, setpoints, with_gimbal,
+    with_gimbal_that,
 };
 use crate::support::script::{
-    ACCEPTED, NAN, command_int, command_long, device_status, of, pitch_yaw_deg, pitchyaw, set_attitude,
-    set_manual_control, set_pitchyaw,
+    ACCEPTED, NAN, command_int, command_long, device_information, device_status, of, pitch_yaw_deg, pitchyaw,
+    set_attitude, set_manual_control, set_pitchyaw, usual_capabilities,
 };
 use crate::support::world::{GCS, GIMBAL, MANAGER, World, three_links};
 
@@ -361,4 +365,58 @@ fn a_rotation_about_north_is_stopped_in_the_frame_that_the_device_takes_then() {
         told.iter().all(|(_, told)| !told.q[0].is_nan() || told.angular_velocity_z == 0.0),
         "it is told to turn in no other frame than it was asked for: {told:?}"
     );
+}
+
+/// "A gimbal never keeps turning after its operator is gone": where yaw is told from North only, and where North is not known, the
+/// zeros that end what it may have been told before it started again are said all the same, for as long.
+#[test]
+fn to_stop_takes_no_heading_where_the_device_is_told_yaw_from_north() {
+    let entry =
+        GimbalSettings { device_yaw_frame: DeviceYawFrame::Earth, ..GimbalSettings::found("camera".to_owned()) };
+    let settings = Settings { gimbals: vec![entry], ..three_links() };
+    let (mut world, places) = with_gimbal_that(usual_capabilities(), settings);
+    let says = |world: &mut World, boot_ms: u64, duration: Duration| {
+        for step in 0..(duration.as_millis() as u64 / 100) {
+            let status = device_status(Timestamp::from_millis(boot_ms + 100 * step), 44, 0.0, 10.0);
+            world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status));
+            world.run_for(SECOND / 10);
+        }
+    };
+    says(&mut world, 90_000, SECOND / 2);
+    world.send(places.ground, GCS, &set_pitchyaw(NAN, NAN, 0.0, 0.1, 92));
+    says(&mut world, 91_000, SECOND / 2);
+    let told = setpoints(&mut world, places);
+    assert!(!told.is_empty() && told.iter().all(|(_, told)| turns(told) == [0.0, 0.1]), "{told:?}");
+
+    says(&mut world, 1_000, 3 * SECOND);
+    let told = setpoints(&mut world, places);
+    assert!(told.len() >= 55, "20 times a second: {}", told.len());
+    assert!(told.iter().all(|(_, told)| (told.flags, turns(told)) == (92, [0.0, 0.0])), "{told:?}");
+}
+
+/// 283: "Minimum hardware pitch angle. NAN if unknown": a gimbal that is turned by its angles turns no further than straight down
+/// and straight up then, for beyond it would be told to look behind, upside down.
+#[test]
+fn a_pitch_rate_ends_straight_down_and_up_where_no_end_stop_is_known() {
+    for (rate, end) in [(-60.0_f32, -90.0_f64), (60.0, 90.0)] {
+        let (mut world, places) = with_gimbal();
+        let unknown = GIMBAL_DEVICE_INFORMATION_DATA {
+            pitch_min: NAN,
+            pitch_max: NAN,
+            ..device_information(world.now, usual_capabilities())
+        };
+        world.send(places.gimbal, GIMBAL, &MavMessage::GIMBAL_DEVICE_INFORMATION(unknown));
+        let mut pitch = 0.0;
+        for _ in 0..40 {
+            turn_vehicle(&mut world, places, 0.0);
+            look(&mut world, places, pitch, 0.0);
+            world.send(places.ground, GCS, &set_pitchyaw(NAN, NAN, rate.to_radians(), 0.0, 92));
+            world.run_for(SECOND / 10);
+            for (_, told) in setpoints(&mut world, places) {
+                pitch = 2.0 * f64::from(told.q[2]).atan2(told.q[0].into()).to_degrees();
+                assert!(pitch.abs() < 90.01 && [told.q[1], told.q[3]].iter().all(|q| q.abs() < 1e-3), "{told:?}");
+            }
+        }
+        assert_near(pitch, end, 0.01);
+    }
 }
