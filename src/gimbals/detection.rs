@@ -5,7 +5,8 @@
 //! Gremsy has, and otherwise taken for a v1 gimbal: soon when it tells where it looks by a message of v1, late when it sends
 //! nothing but heartbeats. Nothing of this moves it. Whenever a sign of v2 comes after all, it is a v2 device again, and one
 //! that is taken for a v1 gimbal is asked on for what only a Gremsy has. One that was lost is taken for what it was and judged
-//! again, for another may have come in its place. What a v2 device says of itself outweighs the name
+//! again, for another may have come in its place; so is a v2 device that tells where it looks by v1 alone, for that
+//! may have happened before it was called lost. What a v2 device says of itself outweighs the name
 //! of a parameter, which anybody may use.
 
 use std::collections::VecDeque;
@@ -35,6 +36,10 @@ pub const V1_BY_ITS_ATTITUDE_AFTER: Duration = Duration::from_secs(5);
 /// So is one that sends nothing but heartbeats for so long; a v2 device may take 15 s to start.
 pub const V1_BY_ITS_SILENCE_AFTER: Duration = Duration::from_secs(20);
 
+/// A v2 device tells where it looks several times a second. One that does not for so long, but by messages of v1, is asked what
+/// it is, and judged again.
+const V2_DOUBTED_AFTER: Duration = Duration::from_secs(10);
+
 /// A gimbal that gives no sign of v2 for so long is asked for parameters of certain makes …
 const ASK_PARAMETERS_AFTER: Duration = Duration::from_secs(2);
 /// … so often …
@@ -56,6 +61,8 @@ pub struct Detection {
     evidence: Evidence,
     /// That it is there was reported, and that it is lost was not.
     is_reported: bool,
+    /// When it last gave a sign of v2.
+    spoke_v2: Timestamp,
     /// It was lost and has not beaten since: what comes back may be another.
     was_lost: bool,
     /// How it was last told to turn, while it is not told anything else.
@@ -94,6 +101,7 @@ impl Detection {
             other: None,
             evidence: Evidence::default(),
             is_reported: false,
+            spoke_v2: Timestamp::ZERO,
             was_lost: false,
             turning: None,
             stops_as: None,
@@ -178,6 +186,9 @@ impl Detection {
 
     /// Notes what a frame of the device says of its family.
     fn weigh(&mut self, now: Timestamp, frame: &Frame<'_>) {
+        if matches!(frame.message_id(), message::GIMBAL_DEVICE_INFORMATION | message::GIMBAL_DEVICE_ATTITUDE_STATUS) {
+            self.spoke_v2 = now;
+        }
         // One of these speaks both v1 and v2, and says by 283 that it is one.
         if self.family() == Family::Gremsy {
             match frame.message_id() {
@@ -201,10 +212,14 @@ impl Detection {
         }
         match frame.message_id() {
             message::HEARTBEAT if !self.is_reported && self.other.is_none() && !self.evidence.v2 => {
-                self.evidence.questions = 0;
-                self.timers.set(Timer::AskParameters, now + ASK_PARAMETERS_AFTER);
-                self.timers.set(Timer::JudgeByAttitude, now + V1_BY_ITS_ATTITUDE_AFTER);
-                self.timers.set(Timer::JudgeBySilence, now + V1_BY_ITS_SILENCE_AFTER);
+                self.begin_judging(now);
+            }
+            message::MOUNT_ORIENTATION | message::MOUNT_STATUS
+                if self.evidence.v2 && now.since(self.spoke_v2) >= V2_DOUBTED_AFTER =>
+            {
+                self.evidence = Evidence { v1_attitude: true, ..Evidence::default() };
+                self.v2.ask_information_anew(now);
+                self.begin_judging(now);
             }
             message::HEARTBEAT if self.family() == Family::MavlinkV1 => {
                 self.timers.set_no_later(Timer::AskParameters, now + ASK_PARAMETERS_AGAIN_EVERY);
@@ -234,6 +249,13 @@ impl Detection {
             let zeros = gremsy::packet::turn_at(device, [AngularRate::ZERO; 3]);
             self.outputs.push_back(DriverOutput::Message(Box::new(MavMessage::COMMAND_LONG(zeros))));
         }
+    }
+
+    fn begin_judging(&mut self, now: Timestamp) {
+        self.evidence.questions = 0;
+        self.timers.set(Timer::AskParameters, now + ASK_PARAMETERS_AFTER);
+        self.timers.set(Timer::JudgeByAttitude, now + V1_BY_ITS_ATTITUDE_AFTER);
+        self.timers.set(Timer::JudgeBySilence, now + V1_BY_ITS_SILENCE_AFTER);
     }
 
     fn stop_judging(&mut self) {

@@ -130,6 +130,13 @@ impl MavlinkV2Driver {
         self.ask_anew(now);
     }
 
+    /// It may be another one, and is asked what it is.
+    pub fn ask_information_anew(&mut self, now: Timestamp) {
+        if self.alive {
+            self.ask_anew(now);
+        }
+    }
+
     fn ask_anew(&mut self, now: Timestamp) {
         self.informed = false;
         self.first_status = None;

@@ -44,6 +44,28 @@ fn another_family_in_the_place_of_one_that_was_lost_is_found_out() {
     }
 }
 
+/// The same where a v1 gimbal is there before the first was called lost.
+#[test]
+fn a_v1_gimbal_that_takes_the_place_of_a_v2_device_at_once_is_found_out() {
+    for feedback in [Feedback::Orientation, Feedback::Status] {
+        let (mut world, places) = World::empty(three_links());
+        world.install(places.autopilot, Vehicle::new(Timestamp::ZERO, VehicleSettings::default()));
+        install(&mut world, places, "mavlink_v2");
+        run(&mut world, places, 25 * SECOND);
+        world.remove(places.gimbal);
+        run(&mut world, places, SECOND);
+        let settings = DeviceSettings { feedback, ..DeviceSettings::default() };
+        let device = Device::new(world.now, settings);
+        world.install(places.gimbal, device);
+        run(&mut world, places, 20 * SECOND);
+        for _ in 0..20 {
+            assert_eq!(family(&world), "mavlink_v1", "{feedback:?}");
+            assert_eq!(world.snapshot().gimbals[0].state, "alive", "{feedback:?}");
+            run(&mut world, places, SECOND);
+        }
+    }
+}
+
 /// D2: "a v2 device: its own component id … Any other gimbal: 1..6", which is kept for it: "whoever learned an id goes by it for
 /// good", also when a v2 device was there meanwhile.
 #[test]
