@@ -16,7 +16,8 @@ use crate::wire::dialect::{MavMessage, REQUEST_DATA_STREAM_DATA, TIMESYNC_DATA};
 use crate::wire::ids::{command, message};
 use crate::wire::{Frame, MavId, Target};
 
-/// Intervals at which messages of the autopilot are asked for.
+/// Intervals at which messages of the autopilot are asked for; the first is 50 times a second, if a third of the line can carry it,
+/// for a gimbal whose measuring leans on it.
 const STATE_EVERY: Duration = Duration::from_millis(40);
 const HEADING_EVERY: Duration = Duration::from_millis(100);
 const POSITION_EVERY: Duration = Duration::from_millis(200);
@@ -36,6 +37,8 @@ struct GimbalToTell {
     channel: ChannelId,
     device: MavId,
     manager: u8,
+    /// It wants that often.
+    leans_on_attitude: bool,
 }
 
 impl Bridge {
@@ -47,7 +50,12 @@ impl Bridge {
             _ => {}
         }
         self.look_after_state_for_gimbals(now);
-        let state = if self.gimbals_to_tell().next().is_some() { Need::Some(STATE_EVERY) } else { Need::None };
+        let leaning = self.gimbals_to_tell().map(|gimbal| gimbal.leans_on_attitude).max();
+        let state = match leaning {
+            None => Need::None,
+            Some(false) => Need::Some(STATE_EVERY),
+            Some(true) => Need::AtLeast(interval_for(self.autopilot_baud(), STATE_LEN, 3, SHORTEST).min(STATE_EVERY)),
+        };
         let heading = if self.vehicle.heading(now).is_none() { Need::Some(HEADING_EVERY) } else { Need::None };
         for (message_id, need) in [
             (message::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE, state),
@@ -76,10 +84,7 @@ impl Bridge {
     /// An attitude as often as gimbals are to be told, as far as the line to the autopilot can carry it, and the rest
     /// of the state more slowly. An attitude takes an eighth of a serial line at most, the others half a one each.
     fn need_what_state_is_made_of(&mut self, now: Timestamp) {
-        let baud = self.autopilot.and_then(|autopilot| {
-            let channels = self.router.routes().component_channels(autopilot);
-            channels.filter_map(|channel| self.baud(channel)).min()
-        });
+        let baud = self.autopilot_baud();
         let attitude = interval_for(baud, ATTITUDE_QUATERNION_LEN, 8, SHORTEST);
         let comes = |message_id| self.streams.comes_every(now, message_id, attitude.max(LONGEST));
         let comes = comes(message::ATTITUDE_QUATERNION) || comes(message::ATTITUDE);
@@ -201,7 +206,8 @@ impl Bridge {
         let alive = self.roster.iter().filter(|gimbal| gimbal.manager.state() == DeviceState::Alive);
         let there = alive.filter_map(|gimbal| {
             let (channel, device) = (gimbal.channel?, gimbal.manager.device()?);
-            Some(GimbalToTell { channel, device, manager: gimbal.component })
+            let leans_on_attitude = gimbal.driver.leans_on_attitude();
+            Some(GimbalToTell { channel, device, manager: gimbal.component, leans_on_attitude })
         });
         there.filter(move |gimbal| !of_autopilot.contains(gimbal.channel))
     }
@@ -223,6 +229,12 @@ impl Bridge {
         let channels = self.router.route_own(now, Target::Component(autopilot));
         let manager = self.roster.get_mut(0).component;
         self.send(now, channels, manager, &MavMessage::TIMESYNC(request));
+    }
+
+    /// Bits per second of the slowest serial line to the autopilot.
+    fn autopilot_baud(&self) -> Option<u32> {
+        let channels = self.router.routes().component_channels(self.autopilot?);
+        channels.filter_map(|channel| self.baud(channel)).min()
     }
 
     /// Bits per second, where the channel is a serial line.

@@ -400,6 +400,10 @@ impl GimbalDriver for Detection {
         self.stops_as = Some(family);
     }
 
+    fn leans_on_attitude(&self) -> bool {
+        self.other.as_ref().is_some_and(|other| other.leans_on_attitude())
+    }
+
     fn may_be_turning(&self) -> bool {
         self.other.as_ref().map_or_else(|| self.v2.may_be_turning(), |other| other.may_be_turning())
     }

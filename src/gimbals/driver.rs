@@ -54,6 +54,11 @@ pub trait GimbalDriver: std::fmt::Debug {
         Vec::new()
     }
 
+    /// Whether what it measures leans on the autopilot's attitude, so that it wants that often.
+    fn leans_on_attitude(&self) -> bool {
+        false
+    }
+
     /// The family whose words stop it where those of a v2 device do not, by the configuration or as it was found out: the
     /// next run stops in these words what this one could not, also where its configuration does not name it.
     fn stops_as(&self) -> Option<Family> {

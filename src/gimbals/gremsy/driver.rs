@@ -323,6 +323,7 @@ impl GimbalDriver for GremsyDriver {
             message::PARAM_VALUE => {
                 self.parameters.handle_received(now, frame);
                 self.look_at_settings();
+                self.tell_north(now);
             }
             message::MOUNT_ORIENTATION => self.handle_orientation(now, device, frame),
             message::MOUNT_STATUS => {
@@ -419,6 +420,10 @@ impl GimbalDriver for GremsyDriver {
             }
         }
         self.go_on(now);
+    }
+
+    fn leans_on_attitude(&self) -> bool {
+        self.combines_attitude()
     }
 
     fn stops_as(&self) -> Option<Family> {

@@ -127,6 +127,32 @@ fn a_state_that_the_autopilot_tells_is_only_forwarded() {
     }
 }
 
+/// "Combine attitude … needs autopilot attitude at 50–100 Hz"; "286 (or ATTITUDE) at 50 Hz is sufficient" (gimbals 1.5, 1.7): a
+/// gimbal that leans on it gets it so often where the autopilot sends it as it is asked to, any other one as often as it likes.
+#[test]
+fn a_gimbal_that_leans_on_the_attitude_gets_it_fifty_times_a_second() {
+    use gimbald::gimbals::gremsy::sim;
+    for autopilot in [Autopilot::Px4, Autopilot::ArduPilot] {
+        let leaning = [sim::Generation::V1, sim::Generation::V2].map(Some);
+        for generation in leaning.into_iter().chain([None]) {
+            let (mut world, places) = flight(three_links(), vehicle(autopilot, StateForGimbals::Told));
+            if let Some(generation) = generation {
+                world.remove(places.gimbal);
+                let gremsy = sim::Device::new(Timestamp::ZERO, sim::DeviceSettings::of(generation));
+                world.install(places.gimbal, gremsy);
+            }
+            world.run_for(30 * SECOND);
+            world.forget();
+            world.run_for(4 * SECOND);
+
+            let told = states(&mut world, places.gimbal);
+            assert!(told.iter().all(|(_, source, _)| *source == AUTOPILOT), "{autopilot:?} {generation:?}");
+            let expected = if generation.is_some() { 196..=204 } else { 78..=102 };
+            assert!(expected.contains(&told.len()), "{autopilot:?} {generation:?}: {}", told.len());
+        }
+    }
+}
+
 /// `synthesize_286 = "off"`: it is still asked for, and never made.
 #[test]
 fn nothing_is_made_where_the_user_does_not_want_it() {

@@ -39,6 +39,21 @@ impl GremsyDriver {
         if let Some(message) = frame.decode::<MOUNT_ORIENTATION_DATA>() {
             self.handle_boot_ms(now, device, message.time_boot_ms);
         }
+        self.tell_orientation(now, orientation);
+    }
+
+    /// In v1, that it was told to combine attitudes or no more is known before it tells where it looks again.
+    pub(super) fn tell_north(&mut self, now: Timestamp) {
+        let told = self.heard.attitude.map(|(_, status)| status.accepts_earth_yaw);
+        let latest = self.heard.orientation.filter(|(at, _)| now.since(*at) <= ORIENTATION_FRESH);
+        if let (Some(Generation::V1), Some((_, orientation))) = (self.search.decided(), latest)
+            && told.is_some_and(|told| told != self.knows_north(now))
+        {
+            self.tell_orientation(now, orientation);
+        }
+    }
+
+    fn tell_orientation(&mut self, now: Timestamp, orientation: Orientation) {
         let is_locked = self.is_locked();
         let knows_north = self.knows_north(now);
         // In LOCK its yaw from North counts, where it knows that.
@@ -157,7 +172,11 @@ impl GremsyDriver {
     fn knows_north(&self, now: Timestamp) -> bool {
         let is_wrong = self.version().is_some_and(|version| version.has_wrong_earth_yaw());
         let is_fed = self.is_fed_since.is_some_and(|since| now.since(since) >= NORTH_WITHIN);
-        !is_wrong && is_fed && self.axis_flags().is_some_and(|flags| flags.contains(AxisFlags::COMBINE_ATTITUDE))
+        !is_wrong && is_fed && self.combines_attitude()
+    }
+
+    pub(super) fn combines_attitude(&self) -> bool {
+        self.axis_flags().is_some_and(|flags| flags.contains(AxisFlags::COMBINE_ATTITUDE))
     }
 
     pub(super) fn axis_flags(&self) -> Option<AxisFlags> {

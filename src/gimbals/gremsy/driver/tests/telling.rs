@@ -172,6 +172,37 @@ fn statement_19_a_yaw_from_north_is_told_where_there_is_a_true_one() {
     }
 }
 
+/// "205 yaw earth only if attitude is fed; otherwise vehicle yaw" (gimbals 2.5): once it is told to combine attitudes no more, no yaw
+/// from North is taken for it, whenever it tells where it looks next.
+#[test]
+fn what_it_is_told_of_north_is_known_at_once() {
+    let mut driver = driver(Generation::V1);
+    let heading = Some(Angle::from_degrees(70.0));
+    for millis in [0, 2_500] {
+        driver.handle_vehicle_heading(heading);
+        hear(&mut driver, Timestamp::from_millis(millis), &heartbeat());
+        tell_parameter(&mut driver, Timestamp::from_millis(millis), "STIFF_TILT", 20);
+        tell_parameter(&mut driver, Timestamp::from_millis(millis), "RC_REVERSE_AXIS", 0x10);
+    }
+    let accepts = |driver: &mut GremsyDriver| -> Vec<bool> {
+        let outputs = std::iter::from_fn(|| driver.poll_output());
+        let told = outputs.filter_map(|output| match output {
+            DriverOutput::Report(Report::Attitude(told)) => Some(told.accepts_earth_yaw),
+            _ => None,
+        });
+        told.collect()
+    };
+    tell_orientation(&mut driver, 2_600, 15.0, 85.0);
+    assert_eq!(accepts(&mut driver), [true]);
+
+    tell_parameter(&mut driver, Timestamp::from_millis(2_610), "RC_REVERSE_AXIS", 0x08);
+    assert_eq!(accepts(&mut driver), [false]);
+    tell_parameter(&mut driver, Timestamp::from_millis(2_620), "RC_REVERSE_AXIS", 0x18);
+    assert_eq!(accepts(&mut driver), [true]);
+    tell_parameter(&mut driver, Timestamp::from_millis(2_630), "RC_REVERSE_AXIS", 0x18);
+    assert_eq!(accepts(&mut driver), Vec::<bool>::new());
+}
+
 /// "if the commanded pose differs by > 10° from the report for > 3 s" (gimbals 1.10), also where it is commanded more often than
 /// anything is sent and a little otherwise each time, as ArduPilot and a joystick do.
 #[test]
