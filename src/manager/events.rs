@@ -297,7 +297,7 @@ fn explain(reason: &str) -> String {
         "not_an_id" => "it named something that is no id",
         "unknown_gimbal" => "it named a gimbal that is not here",
         "no_gimbal_yet" => "no gimbal was heard yet",
-        "gimbal_unknown_yet" => "the gimbal is heard, and has not told yet what it is",
+        "gimbal_unknown_yet" => "the gimbal is heard, and is still being got to know or starting",
         "gimbal_starting" => STARTING,
         "gimbal_shut_down" => "the gimbal was shut down; switch it on",
         "no_attitude" => "the attitude of the gimbal is not known",

@@ -27,6 +27,8 @@ pub enum Fault {
     NoAttitude,
     /// It does not change between lock and follow.
     ModeRefused,
+    /// The same where it is configured as a v1 gimbal and may be a v2 one.
+    NotV1,
     /// It answers nothing about parameters.
     NoParameters,
     /// It beats, and says nothing of how it is.
@@ -36,6 +38,7 @@ pub enum Fault {
     /// It does not become ready.
     NotAligned(Alignment),
     Sensor,
+    Encoder(Alignment),
     MotorPhase,
     MotorAngle,
     BatteryLow,
@@ -54,11 +57,13 @@ impl Fault {
             Self::StaysRetracted => "motors stay off, restart it",
             Self::NoAttitude => "sends no attitude (gremsy_generation)",
             Self::ModeRefused => "refuses lock or follow",
+            Self::NotV1 => "is no v1 gimbal (gremsy_generation)",
             Self::NoParameters => "answers no parameters",
             Self::NoStatus => "does not tell its status",
             Self::OtherMaker(_) => "says it is no Gremsy",
             Self::NotAligned(_) => "does not become ready",
             Self::Sensor => "sensor error",
+            Self::Encoder(_) => "encoder error",
             Self::MotorPhase => "motor phase error",
             Self::MotorAngle => "motor angle error",
             Self::BatteryLow => "battery is low",
@@ -66,7 +71,7 @@ impl Fault {
     }
 
     const fn is_of_status(&self) -> bool {
-        matches!(self, Self::Sensor | Self::MotorPhase | Self::MotorAngle | Self::BatteryLow)
+        matches!(self, Self::Sensor | Self::Encoder(_) | Self::MotorPhase | Self::MotorAngle | Self::BatteryLow)
     }
 }
 
@@ -106,6 +111,11 @@ impl fmt::Display for Fault {
                 "it refuses to change between lock and follow, so it is not told where to look. Check that the radio type is \
                  sync, or restart it",
             ),
+            Self::NotV1 => f.write_str(
+                "it refuses to change between lock and follow, as a v2 gimbal does that gremsy_generation calls v1. Leave \
+                 gremsy_generation out to have it found out; if it is right, check that the radio type is sync, or restart the \
+                 gimbal",
+            ),
             Self::NoParameters => f.write_str(
                 "it answers no parameter requests, so its limits and settings are not known. Update the firmware if they are \
                  needed",
@@ -129,6 +139,11 @@ impl fmt::Display for Fault {
                 )
             }
             Self::Sensor => f.write_str("sensor error. Restart it without moving it; if it stays, have it repaired"),
+            Self::Encoder(which) => {
+                let names: Vec<String> = which.names().collect();
+                let names = names.join(", ");
+                write!(f, "{names} error. Restart it without moving it; if it stays, have it repaired")
+            }
             Self::MotorPhase => f.write_str("motor phase error. Switch it off and have it repaired"),
             Self::MotorAngle => {
                 f.write_str("motor angle error. Check that the camera is balanced and free, and restart the gimbal")
@@ -165,16 +180,20 @@ impl Faults {
         self.present.retain(|present| !is_it(present));
     }
 
-    /// What a `SYS_STATUS` says of errors; those to tell the pilot of.
-    pub fn handle_status(&mut self, status: SystemStatus) -> Vec<&'static str> {
+    /// What a `SYS_STATUS` says of errors; those to tell the pilot of. Sensors that are not in place yet while it starts are none.
+    pub fn handle_status(&mut self, status: SystemStatus, is_running: bool) -> Vec<&'static str> {
+        let SystemStatus { activity, alignment, .. } = status;
+        let failed = if is_running { alignment.intersection(Alignment::SENSORS) } else { Alignment::empty() };
+        let encoders = failed.difference(Alignment::IMU);
         let faults = [
-            (Activity::SENSOR_ERROR, Fault::Sensor),
-            (Activity::MOTOR_PHASE_ERROR, Fault::MotorPhase),
-            (Activity::MOTOR_ANGLE_ERROR, Fault::MotorAngle),
-            (Activity::BATTERY_LOW, Fault::BatteryLow),
+            (activity.contains(Activity::SENSOR_ERROR) || failed.contains(Alignment::IMU), Fault::Sensor),
+            (!encoders.is_empty(), Fault::Encoder(encoders)),
+            (activity.contains(Activity::MOTOR_PHASE_ERROR), Fault::MotorPhase),
+            (activity.contains(Activity::MOTOR_ANGLE_ERROR), Fault::MotorAngle),
+            (activity.contains(Activity::BATTERY_LOW), Fault::BatteryLow),
         ];
         self.clear(Fault::is_of_status);
-        let present = faults.into_iter().filter(|(bit, _)| status.activity.contains(*bit));
+        let present = faults.into_iter().filter(|(is_there, _)| *is_there);
         present.filter_map(|(_, fault)| self.raise(fault)).collect()
     }
 
@@ -205,7 +224,9 @@ mod tests {
             Fault::NoStatus,
             Fault::OtherMaker("STorM32".to_owned()),
             Fault::NotAligned(Alignment::ENCODER_ROLL),
+            Fault::NotV1,
             Fault::Sensor,
+            Fault::Encoder(Alignment::ENCODER_PAN),
             Fault::MotorPhase,
             Fault::MotorAngle,
             Fault::BatteryLow,

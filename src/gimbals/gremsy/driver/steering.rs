@@ -358,10 +358,12 @@ impl GremsyDriver {
                 }
                 MountOutput::ModeRefused => {
                     self.faults.clear(|fault| *fault == Fault::NoAnswers);
-                    self.raise(Fault::ModeRefused);
+                    let may_be_v2 = self.version().is_none_or(|version| version.may_speak_v2());
+                    let is_set_to_v1 = self.settings.generation == Some(Generation::V1);
+                    self.raise(if is_set_to_v1 && may_be_v2 { Fault::NotV1 } else { Fault::ModeRefused });
                 }
                 MountOutput::ModeTaken => {
-                    self.faults.clear(|fault| matches!(fault, Fault::ModeRefused | Fault::NoAnswers));
+                    self.faults.clear(|fault| matches!(fault, Fault::ModeRefused | Fault::NotV1 | Fault::NoAnswers));
                 }
                 MountOutput::StaysRetracted => self.raise_stays_off(),
                 MountOutput::Unanswered => self.raise_unanswered(now),

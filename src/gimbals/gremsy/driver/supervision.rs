@@ -193,7 +193,8 @@ impl GremsyDriver {
             self.faults.clear(|fault| matches!(fault, Fault::NotAligned(_)));
         }
         self.faults.clear(|fault| *fault == Fault::NoStatus);
-        for short in self.faults.handle_status(status) {
+        let is_running = was_running && !status.activity.contains(Activity::STARTING_UP);
+        for short in self.faults.handle_status(status, is_running) {
             self.warn(short);
         }
         if status.motors_on() {

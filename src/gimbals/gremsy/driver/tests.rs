@@ -223,6 +223,32 @@ fn one_that_has_become_ready_is_not_said_to_become_ready_no_more() {
     assert_eq!((details.stage.as_deref(), details.not_aligned), (Some("running"), vec!["pan_home_search".to_owned()]));
 }
 
+/// "ERROR if (ec1 & 0xC004) or (ec2 & 0x0F)" (gimbals 1.4): what fails of these while it runs is a fault as long as it is so; while it
+/// starts it is only not in place yet.
+#[test]
+fn a_sensor_that_fails_while_it_runs_is_a_fault() {
+    for (alignment, fault) in [
+        (0x0001, Some("sensor error. Restart it without moving it; if it stays, have it repaired")),
+        (0x0002, Some("encoder_tilt error. Restart it without moving it; if it stays, have it repaired")),
+        (0x000c, Some("encoder_roll, encoder_pan error. Restart it without moving it; if it stays, have it repaired")),
+        (0x0040, None),
+    ] {
+        let mut driver = GremsyDriver::new(GremsySettings::default());
+        driver.adopt(Timestamp::ZERO, GIMBAL);
+        run_with(&mut driver, 0, 15_000, &status(alignment));
+        assert_eq!(faults(&driver), Vec::<String>::new(), "it starts");
+        run(&mut driver, 15_000, 27_000);
+        assert_eq!(driver.details(Timestamp::from_secs(27)).stage.as_deref(), Some("running"));
+        let before = faults(&driver);
+
+        run_with(&mut driver, 27_000, 30_000, &status(alignment));
+        let expected: Vec<String> = before.iter().cloned().chain(fault.map(str::to_owned)).collect();
+        assert_eq!(faults(&driver), expected, "{alignment:#x}");
+        run(&mut driver, 30_000, 32_000);
+        assert_eq!(faults(&driver), before, "{alignment:#x}");
+    }
+}
+
 /// "It stands in the status as long as it is so": firmware with a wrong yaw from North was replaced.
 #[test]
 fn a_fault_of_the_firmware_ends_with_it() {
