@@ -44,7 +44,10 @@ fn forward(bridge: &mut Bridge, frame: &[u8]) {
             Output::Transmit { channels, bytes } => {
                 black_box((channels, bytes));
             }
-            Output::StoreSystemId(_) | Output::StoreTurning(_) | Output::Answered { .. } => {}
+            Output::StoreSystemId(_)
+            | Output::StoreTurning(_)
+            | Output::StoreGimbalIds(_)
+            | Output::Answered { .. } => {}
         }
     }
 }

@@ -121,6 +121,8 @@ pub enum Output<'a> {
     StoreSystemId(u8),
     /// Keep which gimbals are told to turn, one to a line, for a start after we were killed; empty when none is.
     StoreTurning(&'a str),
+    /// Keep which ids gimbals without an entry were given, one to a line, for the next start.
+    StoreGimbalIds(&'a str),
     /// What became of something asked.
     Answered { id: OperationId, answer: &'a Answer },
 }
@@ -160,6 +162,8 @@ pub struct Bridge {
     stopping: Option<Stopping>,
     /// Kept outside when it changes.
     turning: NotedTurning,
+    /// The revision of the ids of gimbals that was given out to be kept.
+    kept_ids: u32,
 }
 
 /// A system that has an autopilot.
@@ -211,6 +215,7 @@ impl Bridge {
             shutting_down: false,
             stopping: None,
             turning: NotedTurning::default(),
+            kept_ids: 0,
             identity,
             settings,
         };

@@ -7,6 +7,7 @@ pub mod clock;
 mod event_loop;
 pub mod logging;
 pub mod shutdown;
+mod state_file;
 pub mod supervisor;
 mod system_id_file;
 mod systemd;

@@ -33,6 +33,7 @@ impl Bridge {
         self.answer_for_lost_gimbals(now);
         self.carry_out_own_commands(now);
         self.note_turning();
+        self.note_gimbal_ids();
     }
 
     /// Whoever is killed while a gimbal turns finds out at the next start that it is to be stopped, and so are those that are
@@ -50,6 +51,16 @@ impl Bridge {
         let lines: String = lines.map(|left| format!("{left}\n")).collect();
         self.turning = NotedTurning { gimbals, awaited: awaited.revision() };
         self.outbox.push_turning(lines);
+    }
+
+    /// The next start gives every gimbal the ids that it has.
+    fn note_gimbal_ids(&mut self) {
+        let kept = self.roster.kept_ids();
+        if self.kept_ids != kept.revision() {
+            self.kept_ids = kept.revision();
+            let lines = kept.iter().map(|ids| format!("{ids}\n")).collect();
+            self.outbox.push_gimbal_ids(lines);
+        }
     }
 
     pub(super) fn carry_out_for_gimbals(&mut self, now: Timestamp) {

@@ -14,6 +14,7 @@ pub struct Outbox {
     entries: VecDeque<Entry>,
     /// The last ones that were given out.
     turning: String,
+    gimbal_ids: String,
     answer: Answer,
 }
 
@@ -22,12 +23,19 @@ enum Entry {
     Frame { channels: ChannelSet, start: usize, end: usize },
     StoreSystemId(u8),
     StoreTurning(String),
+    StoreGimbalIds(String),
     Answered { id: OperationId, answer: Answer },
 }
 
 impl Default for Outbox {
     fn default() -> Self {
-        Self { bytes: Vec::new(), entries: VecDeque::new(), turning: String::new(), answer: Ok(()) }
+        Self {
+            bytes: Vec::new(),
+            entries: VecDeque::new(),
+            turning: String::new(),
+            gimbal_ids: String::new(),
+            answer: Ok(()),
+        }
     }
 }
 
@@ -52,6 +60,10 @@ impl Outbox {
         self.entries.push_back(Entry::StoreTurning(names));
     }
 
+    pub fn push_gimbal_ids(&mut self, lines: String) {
+        self.entries.push_back(Entry::StoreGimbalIds(lines));
+    }
+
     pub fn push_answer(&mut self, id: OperationId, answer: Answer) {
         self.entries.push_back(Entry::Answered { id, answer });
     }
@@ -63,6 +75,10 @@ impl Outbox {
             Entry::StoreTurning(names) => {
                 self.turning = names;
                 Output::StoreTurning(&self.turning)
+            }
+            Entry::StoreGimbalIds(lines) => {
+                self.gimbal_ids = lines;
+                Output::StoreGimbalIds(&self.gimbal_ids)
             }
             Entry::Answered { id, answer } => {
                 self.answer = answer;

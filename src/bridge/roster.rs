@@ -3,9 +3,11 @@
 //! One component per gimbal: device 154 has manager 191, 171 has 192, 172 has 193, 173 has 194; other gimbals take the
 //! free ones in the order of the configuration.
 //!
-//! Which device belongs to which of them is decided in [`adoption`], who is to be stopped in [`left_turning`].
+//! Which device belongs to which of them is decided in [`adoption`], which ids those without an entry are given in [`ids`],
+//! who is to be stopped in [`left_turning`].
 
 mod adoption;
+mod ids;
 mod left_turning;
 
 pub use adoption::{Hearing, NotAdopted, Place, Renamed};
@@ -25,6 +27,7 @@ use crate::manager::{GimbalManager, ManagerOutput};
 use crate::timestamp::Timestamp;
 use crate::wire::MavId;
 use crate::wire::ids::{component, mav_type};
+use ids::KeptIds;
 use left_turning::Awaited;
 
 /// A gimbal with its manager and driver.
@@ -155,6 +158,8 @@ pub struct Roster {
     /// The device id that is kept for each entry whose family is found out, in case that it is no v2 device: whoever learned
     /// an id goes by it for good, so it does not depend on which of them is found first.
     spoken_for: Vec<Option<u8>>,
+    /// What gimbals without an entry were given.
+    kept_ids: KeptIds,
     /// Components of type gimbal that manage a gimbal without MAVLink.
     self_managed: Vec<MavId>,
 }
@@ -168,6 +173,7 @@ impl Roster {
             open: ChannelSet::EMPTY,
             waiting: Vec::new(),
             spoken_for: Vec::new(),
+            kept_ids: KeptIds::read(&settings.kept_ids),
             self_managed: Vec::new(),
         };
         let mut wanted: Vec<Option<u8>> = settings
@@ -211,21 +217,6 @@ impl Roster {
 
     pub fn get_mut(&mut self, at: usize) -> &mut Gimbal {
         &mut self.gimbals[at]
-    }
-
-    /// Keeps a device id for a gimbal that turned out to be no v2 device: its own, or the next that is free. The seventh has
-    /// none, and so is not told of.
-    pub fn keep_number(&mut self, at: usize) {
-        if self.gimbals[at].manager.kept_number().is_some() {
-            return;
-        }
-        let is_kept = |number: &u8| self.gimbals.iter().any(|gimbal| gimbal.manager.kept_number() == Some(*number));
-        let is_spoken_for = |number: &u8| self.spoken_for.contains(&Some(*number));
-        let free = || (1..=voice::LAST_NUMBER).filter(|number| !is_kept(number));
-        let own = self.spoken_for.get(at).copied().flatten().filter(|number| !is_kept(number));
-        if let Some(number) = own.or_else(|| free().find(|number| !is_spoken_for(number))).or_else(|| free().next()) {
-            self.gimbals[at].manager.keep_number(number);
-        }
     }
 
     /// Every manager tells of its gimbal on `channel` from now on.
@@ -283,7 +274,7 @@ impl Roster {
     /// A new gimbal, in the place of one that was only found and is lost for good when no manager is left.
     fn make_place(&mut self, now: Timestamp, device: MavId, ours: u8) -> Result<usize, NotAdopted> {
         let given_up = |gimbal: &Gimbal| !gimbal.configured && gimbal.is_lost_for_good(now);
-        let (at, component) = match self.free_manager(device) {
+        let (at, component) = match self.free_manager(now, device)? {
             Some(component) => (self.gimbals.len(), component),
             None => {
                 let rests = |gimbal: &Gimbal| given_up(gimbal) && !gimbal.may_be_turning();
@@ -315,14 +306,6 @@ impl Roster {
         let numbered = (2_u32..).map(|number| format!("{longer}-{number}"));
         let mut names = [name, longer.to_owned()].into_iter().chain(numbered);
         names.find(is_free).expect("there are more numbers than gimbals")
-    }
-
-    /// The manager component for a device without an entry.
-    fn free_manager(&self, device: MavId) -> Option<u8> {
-        let free = |component: &u8| !self.has_manager(*component);
-        manager_of_device(device.component)
-            .filter(free)
-            .or_else(|| (component::ONBOARD_COMPUTER..=component::ONBOARD_COMPUTER4).find(free))
     }
 
     /// 191 answers clients from the start, before any gimbal is there; unless the user gave the managers other ids.

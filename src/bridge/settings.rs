@@ -15,6 +15,8 @@ pub struct Settings {
     /// The gimbals that an earlier run had told to turn and not to stop, a line of each as it was to be kept: it had no time
     /// for that. Each is told to stop when it is heard.
     pub left_turning: Vec<String>,
+    /// The ids that an earlier run gave to gimbals without an entry, a line of each as it was to be kept. Each gets them again.
+    pub kept_ids: Vec<String>,
     pub links: Vec<LinkSettings>,
     pub gimbals: Vec<GimbalSettings>,
     pub control: ControlSettings,

@@ -29,7 +29,7 @@ pub struct DaemonSettings {
 /// Where something is kept from one start to the next; nowhere when unset.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Directories {
-    /// The adopted system id, for good.
+    /// The adopted system id, and the ids that gimbals were given, for good.
     pub state: Option<PathBuf>,
     /// Which gimbals were told to turn, until the next boot.
     pub runtime: Option<PathBuf>,
@@ -65,6 +65,7 @@ pub(super) fn build(configuration: Configuration, token: Option<Token>, director
             system_id: value_or(vehicle.system_id, Settings::default().system_id),
             stored_system_id: None,
             left_turning: Vec::new(),
+            kept_ids: Vec::new(),
             links,
             gimbals,
             control: self::control(control, roi),

@@ -14,6 +14,7 @@ use super::askers::Askers;
 use super::channels::ChannelTable;
 use super::clock::{Clock, DeadlineTimer};
 use super::shutdown::Shutdown;
+use super::state_file::StateFile;
 use super::system_id_file::SystemIdFile;
 use super::systemd::ServiceManager;
 use super::turning_file::TurningFile;
@@ -57,6 +58,7 @@ struct Ports {
 /// What is kept for the next start.
 pub struct Kept {
     pub system_id: SystemIdFile,
+    pub gimbal_ids: StateFile,
     pub turning: TurningFile,
 }
 
@@ -207,6 +209,7 @@ impl Ports {
                     }
                 }
                 Output::StoreSystemId(id) => self.kept.system_id.store(id),
+                Output::StoreGimbalIds(lines) => self.kept.gimbal_ids.store(lines.to_owned()),
                 Output::StoreTurning(names) => self.kept.turning.store(names),
                 Output::Answered { id, answer } => self.askers.answer(id, answer.clone()),
             }

@@ -9,6 +9,7 @@ use tokio::sync::{mpsc, watch};
 use super::clock::{Clock, DeadlineTimer};
 use super::event_loop::{EventLoop, Kept, REQUESTS, Window};
 use super::shutdown::Shutdown;
+use super::state_file::StateFile;
 use super::system_id_file::SystemIdFile;
 use super::systemd::ServiceManager;
 use super::turning_file::TurningFile;
@@ -48,11 +49,15 @@ fn assemble(settings: DaemonSettings) -> Result<EventLoop, RunError> {
     let timer = DeadlineTimer::new().map_err(RunError::Timer)?;
     let clock = Clock::start();
 
-    let system_id_file = SystemIdFile::new(settings.directories.state);
+    let state = settings.directories.state.as_deref();
+    let system_id_file = SystemIdFile::new(state);
+    let gimbal_ids_file = StateFile::new(state, "gimbal-ids");
     let turning_file = TurningFile::new(settings.directories.runtime);
     let mut core_settings = settings.core;
     core_settings.stored_system_id = core_settings.stored_system_id.or_else(|| system_id_file.read());
     core_settings.left_turning.append(&mut turning_file.read());
+    let gimbal_ids = gimbal_ids_file.read().unwrap_or_default();
+    core_settings.kept_ids.extend(gimbal_ids.lines().map(str::to_owned));
     let names = core_settings.links.iter().map(|link| link.name.clone()).collect();
     let core = Bridge::new(clock.now(), core_settings);
 
@@ -65,6 +70,6 @@ fn assemble(settings: DaemonSettings) -> Result<EventLoop, RunError> {
 
     let links = settings.endpoints.iter().map(links::link).collect();
     let window = Window { requests: received_requests, snapshots: published };
-    let kept = Kept { system_id: system_id_file, turning: turning_file };
+    let kept = Kept { system_id: system_id_file, gimbal_ids: gimbal_ids_file, turning: turning_file };
     Ok(EventLoop::new(core, links, names, clock, timer, shutdown, ServiceManager::new(), kept, window))
 }

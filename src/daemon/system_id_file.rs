@@ -1,124 +1,54 @@
 //! The adopted system id, kept from one start to the next.
 
-use std::fs::{self, File};
-use std::io::{self, Write};
-use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::thread;
+use std::path::Path;
 
-/// Ids that may wait for the storage; an autopilot changes its id once in a lifetime.
-const WAITING: usize = 4;
-const NAME: &str = "system-id";
-const NEW_NAME: &str = "system-id.new";
+use super::state_file::StateFile;
 
-/// A file of one number in the state directory; nothing is kept without that directory.
+/// A file of one number.
 #[derive(Debug)]
 pub struct SystemIdFile {
-    directory: Option<PathBuf>,
-    /// Leads to the thread that writes, once there was something to write.
-    writer: Option<SyncSender<u8>>,
+    file: StateFile,
 }
 
 impl SystemIdFile {
-    pub fn new(directory: Option<PathBuf>) -> Self {
-        Self { directory, writer: None }
+    pub fn new(directory: Option<&Path>) -> Self {
+        Self { file: StateFile::new(directory, "system-id") }
     }
 
     /// What an earlier run stored, if it can be used.
     pub fn read(&self) -> Option<u8> {
-        let path = self.directory.as_ref()?.join(NAME);
-        let text = match fs::read_to_string(&path) {
-            Ok(text) => text,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return None,
-            Err(error) => {
-                tracing::warn!(path = %path.display(), %error, "the stored system id cannot be read");
-                return None;
-            }
-        };
+        let text = self.file.read()?;
         let id = text.trim().parse().ok().filter(|id| *id != 0);
         if id.is_none() {
-            tracing::warn!(path = %path.display(), "the stored system id is not a number from 1 to 255");
+            let path = self.file.path().map(Path::display);
+            tracing::warn!(
+                path = path.map(tracing::field::display),
+                "the stored system id is not a number from 1 to 255"
+            );
         }
         id
     }
 
-    /// Replaces what was stored, on a thread of its own, because storage can be slow.
+    /// Replaces what was stored.
     pub fn store(&mut self, id: u8) {
-        let Some(directory) = &self.directory else { return };
-        let stored = match &self.writer {
-            Some(writer) => writer.try_send(id).map_err(|error| error.to_string()),
-            None => start_writer(directory.clone(), id)
-                .map(|writer| self.writer = Some(writer))
-                .map_err(|error| error.to_string()),
-        };
-        if let Err(reason) = stored {
-            tracing::error!(id, reason, "the system id cannot be stored");
-        }
+        self.file.store(format!("{id}\n"));
     }
-}
-
-/// Starts the thread that writes, with `first` to begin with.
-fn start_writer(directory: PathBuf, first: u8) -> io::Result<SyncSender<u8>> {
-    let (writer, ids) = sync_channel(WAITING);
-    thread::Builder::new().name("system-id".to_owned()).spawn(move || write_all(&directory, first, &ids))?;
-    Ok(writer)
-}
-
-fn write_all(directory: &Path, first: u8, ids: &Receiver<u8>) {
-    for id in std::iter::once(first).chain(ids) {
-        if let Err(error) = replace(directory, id) {
-            tracing::error!(directory = %directory.display(), %error, "the system id cannot be stored");
-        }
-    }
-}
-
-/// Whenever the power fails, the file holds the old number or the new one.
-fn replace(directory: &Path, id: u8) -> io::Result<()> {
-    let new = directory.join(NEW_NAME);
-    let mut file = File::create(&new)?;
-    writeln!(file, "{id}")?;
-    file.sync_all()?;
-    fs::rename(&new, directory.join(NAME))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn directory() -> tempfile::TempDir {
-        tempfile::tempdir().expect("a directory")
-    }
-
-    #[test]
-    fn what_was_stored_is_read_at_the_next_start() {
-        let directory = directory();
-        let file = SystemIdFile::new(Some(directory.path().to_owned()));
-        assert_eq!(file.read(), None);
-
-        let (more, ids) = sync_channel(WAITING);
-        more.send(42).expect("there is room");
-        drop(more);
-        write_all(directory.path(), 7, &ids);
-
-        assert_eq!(file.read(), Some(42));
-        let names: Vec<_> = fs::read_dir(directory.path()).expect("it is there").flatten().collect();
-        assert_eq!(names.len(), 1, "nothing is left behind: {names:?}");
-    }
-
     #[test]
     fn what_cannot_be_used_is_not_read() {
-        let directory = directory();
-        let file = SystemIdFile::new(Some(directory.path().to_owned()));
-        for text in ["", "0", "256", "-1", "gimbal", "1 2"] {
-            fs::write(directory.path().join(NAME), text).expect("it can be written");
-            assert_eq!(file.read(), None, "{text:?}");
+        let directory = tempfile::tempdir().expect("a directory");
+        let file = SystemIdFile::new(Some(directory.path()));
+        assert_eq!(file.read(), None);
+        for (text, expected) in
+            [("", None), ("0", None), ("256", None), ("-1", None), ("gimbal", None), ("1 2", None), ("42\n", Some(42))]
+        {
+            std::fs::write(directory.path().join("system-id"), text).expect("it can be written");
+            assert_eq!(file.read(), expected, "{text:?}");
         }
-    }
-
-    #[test]
-    fn a_missing_directory_is_an_error_that_is_told() {
-        let directory = directory();
-        let error = replace(&directory.path().join("missing"), 1).expect_err("there is no such directory");
-        assert_eq!(error.kind(), io::ErrorKind::NotFound);
     }
 }

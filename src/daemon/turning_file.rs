@@ -1,15 +1,14 @@
 //! Which gimbals were told to turn, kept from one start to the next: whoever is killed cannot stop them.
 
-use std::fs::{self, File};
-use std::io::{self, Read};
-use std::path::{Path, PathBuf};
+use std::fs;
+use std::io;
+use std::path::PathBuf;
+
+use super::state_file::read_beginning;
 
 const NAME: &str = "turning";
 /// What is written goes here first, so that a process that is killed meanwhile leaves one or the other.
 const NEXT_NAME: &str = "turning.next";
-
-/// More is not read: there is room for fewer gimbals.
-const MAX_BYTES: u64 = 16 * 1024;
 
 /// A file in the runtime directory, a line of each gimbal, which is in memory and outlives a restart; nothing is kept without that
 /// directory. It is written when a rotation starts or ends, on the way to the gimbal, which costs a few dozen microseconds.
@@ -55,17 +54,6 @@ impl TurningFile {
     fn path(&self) -> Option<PathBuf> {
         self.directory.as_ref().map(|directory| directory.join(NAME))
     }
-}
-
-/// Whatever stands there: what is no UTF-8 spoils no other line.
-fn read_beginning(path: &Path) -> io::Result<String> {
-    // A pipe in its place would be waited for.
-    if !fs::metadata(path)?.is_file() {
-        return Err(io::Error::other("it is no file; remove it"));
-    }
-    let mut bytes = Vec::new();
-    File::open(path)?.take(MAX_BYTES).read_to_end(&mut bytes)?;
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
 #[cfg(test)]

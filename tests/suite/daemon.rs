@@ -5,6 +5,7 @@
 mod control;
 mod endings;
 mod garbage;
+mod gimbal_ids;
 mod load;
 mod ports;
 mod reports;

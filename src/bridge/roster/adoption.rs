@@ -6,7 +6,7 @@
 
 use std::time::Duration;
 
-use super::{Gimbal, Roster, manager_of_device};
+use super::{Gimbal, Roster};
 use crate::bridge::LinkIndex;
 use crate::channel::ChannelId;
 use crate::manager::DeviceState;
@@ -15,7 +15,7 @@ use crate::wire::MavId;
 
 /// A device silent for so long is lost for good: another under its id may take its place, and its manager's component
 /// id may serve another gimbal.
-const GONE_FOR_GOOD: Duration = Duration::from_secs(10);
+pub(super) const GONE_FOR_GOOD: Duration = Duration::from_secs(10);
 
 /// A cable that is out is plugged in again by then.
 const MAY_COME_BACK_WITHIN: Duration = Duration::from_secs(60);
@@ -52,7 +52,8 @@ pub enum Hearing<'a> {
 /// Why a device is not managed, for the time being or at all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NotAdopted {
-    /// It is not clear yet whether it is new or one that we know under another component id.
+    /// It is not clear yet whether it is new or one that we know under another component id, or whether one comes that has
+    /// the ids that it would be given.
     Waits,
     /// No component id is left for the manager of another gimbal.
     NoManagerLeft,
@@ -153,6 +154,7 @@ impl Roster {
         gimbal.channel = Some(place.channel);
         (gimbal.link, gimbal.adopted_at, gimbal.heard) = (place.link, now, now);
         (gimbal.elsewhere, gimbal.has_twin, gimbal.stopped_for) = (None, None, Vec::new());
+        self.note_ids(at);
         self.stop_if_left_turning(at, device);
         Ok(&mut self.gimbals[at])
     }
@@ -174,6 +176,7 @@ impl Roster {
                 self.self_managed.remove(0);
             }
             self.self_managed.push(id);
+            self.forget_ids(id);
             self.dismiss(now, at);
         }
     }
@@ -231,10 +234,6 @@ impl Roster {
         let is_named = |gimbal: &Gimbal| gimbal.manager.settings().component_id.is_some();
         let named = |gimbal: &Gimbal| gimbal.manager.settings().component_id == Some(device.component);
         let unnamed = |gimbal: &Gimbal| gimbal.configured && !is_named(gimbal);
-        let found = |gimbal: &Gimbal| {
-            let again = gimbal.adopted.is_some_and(|known| known.component == device.component);
-            !gimbal.configured && (again || manager_of_device(device.component) == Some(gimbal.component))
-        };
         let position =
             |wanted: &dyn Fn(&Gimbal) -> bool| self.gimbals.iter().position(|gimbal| fits(gimbal) && wanted(gimbal));
         if let Some(at) = position(&named).or_else(|| position(&unnamed)) {
@@ -256,12 +255,23 @@ impl Roster {
                 return Err(NotAdopted::Waits);
             }
         }
-        let position = self.gimbals.iter().position(|gimbal| fits(gimbal) && found(gimbal));
-        Ok(position)
+        let again = |gimbal: &Gimbal| {
+            let is_it = |known: MavId| {
+                known.component == device.component && (gimbal.is_lost() || !self.were_two(known, device))
+            };
+            !gimbal.configured && gimbal.adopted.is_some_and(is_it)
+        };
+        let waiting_manager = self.waiting_manager(device);
+        let waits = |gimbal: &Gimbal| {
+            !gimbal.configured && gimbal.adopted.is_none() && waiting_manager == Some(gimbal.component)
+        };
+        let position =
+            |wanted: &dyn Fn(&Gimbal) -> bool| self.gimbals.iter().position(|gimbal| fits(gimbal) && wanted(gimbal));
+        Ok(position(&again).or_else(|| position(&waits)))
     }
 
     /// When `device` was first heard.
-    fn waiting_since(&mut self, now: Timestamp, device: MavId) -> Timestamp {
+    pub(super) fn waiting_since(&mut self, now: Timestamp, device: MavId) -> Timestamp {
         if let Some((_, since)) = self.waiting.iter().find(|(known, _)| *known == device) {
             return *since;
         }

@@ -73,7 +73,8 @@ impl fmt::Display for LeftTurning {
     }
 }
 
-fn read_id(text: &str) -> Option<MavId> {
+/// `1/154`.
+pub(super) fn read_id(text: &str) -> Option<MavId> {
     let (system, component) = text.split_once('/')?;
     Some(MavId::new(system.parse().ok()?, component.parse().ok()?))
 }

@@ -46,7 +46,11 @@ fn with_daemon(autopilot: SocketAddr, ground: SocketAddr, test: impl FnOnce(Core
                 DeadlineTimer::new().expect("a timer"),
                 Shutdown::new().expect("signals can be caught"),
                 ServiceManager::new(),
-                Kept { system_id: SystemIdFile::new(None), turning: TurningFile::new(None) },
+                Kept {
+                    system_id: SystemIdFile::new(None),
+                    gimbal_ids: StateFile::new(None, "gimbal-ids"),
+                    turning: TurningFile::new(None),
+                },
                 window,
             );
             poll_fn(|cx| {

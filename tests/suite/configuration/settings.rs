@@ -30,6 +30,7 @@ fn every_key_arrives_where_it_belongs() {
             system_id: SystemId::Fixed(7),
             stored_system_id: None,
             left_turning: Vec::new(),
+            kept_ids: Vec::new(),
             links: vec![
                 link("nose", Role::Gimbal, serial, Transport::Serial { baud: 57_600 }, false, &[]),
                 link("autopilot", Role::Autopilot, tcp, Transport::Stream, false, &[]),

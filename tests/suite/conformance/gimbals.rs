@@ -1,6 +1,7 @@
 //! Several gimbals, and gimbals that come late, move, change their ids or share one (protocol notes 4.1, 4.2, 4.6).
 
 mod ids;
+mod kept_ids;
 
 use std::time::Duration;
 

@@ -74,6 +74,8 @@ pub struct World {
     pub stored_system_ids: Vec<u8>,
     /// The gimbals that were told to turn, by name.
     pub stored_turning: Vec<String>,
+    /// The ids that gimbals without an entry were given, each time that this changed.
+    pub stored_gimbal_ids: Vec<Vec<String>>,
     /// What became of what was asked of gimbals by name.
     pub answers: Vec<(OperationId, Answer)>,
     asked_by_name: u64,
@@ -95,6 +97,7 @@ impl World {
             ends: Vec::new(),
             stored_system_ids: Vec::new(),
             stored_turning: Vec::new(),
+            stored_gimbal_ids: Vec::new(),
             answers: Vec::new(),
             asked_by_name: 0,
         };
@@ -321,6 +324,10 @@ impl World {
                 }
                 Output::StoreTurning(names) => {
                     self.stored_turning = names.lines().map(str::to_owned).collect();
+                    continue;
+                }
+                Output::StoreGimbalIds(lines) => {
+                    self.stored_gimbal_ids.push(lines.lines().map(str::to_owned).collect());
                     continue;
                 }
                 Output::Answered { id, answer } => {
