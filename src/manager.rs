@@ -28,6 +28,7 @@ mod mount_reports;
 mod output;
 mod ownership;
 mod readiness;
+mod restarts;
 pub mod roi;
 pub mod rotation;
 mod telling;
@@ -58,6 +59,7 @@ pub use output::ManagerOutput;
 use rank::Ranks;
 use readiness::ReadinessWatch;
 use request::Request;
+use restarts::Restarts;
 use rotation::Rotation;
 use settings::ControlSettings;
 use telling::can_aim;
@@ -120,6 +122,7 @@ pub struct GimbalManager {
     identity: Identity,
     capabilities: Option<Capabilities>,
     readiness: ReadinessWatch,
+    restarts: Restarts,
     /// Whether it is a v2 device is known, and so the device id that it has to clients.
     has_settled_id: bool,
     status: Option<(Timestamp, GimbalStatus)>,
@@ -182,6 +185,7 @@ impl GimbalManager {
             identity: Identity::default(),
             capabilities: None,
             readiness: ReadinessWatch::default(),
+            restarts: Restarts::default(),
             has_settled_id,
             status: None,
             is_heard: false,
@@ -352,6 +356,11 @@ impl GimbalManager {
     /// By how much the gimbal takes the vehicle's heading for another than the autopilot does, where that is much.
     pub fn heading_apart(&self, now: Timestamp) -> Option<Angle> {
         self.heading_bias.apart(now).filter(|_| self.status.is_some())
+    }
+
+    /// Whether two on one line seem to have the id of its device.
+    pub fn seems_to_be_two(&self, now: Timestamp) -> bool {
+        self.restarts.are_of_two(now)
     }
 
     /// What was refused, by sender and reason.

@@ -33,6 +33,8 @@ pub enum Conflict {
     FallbackTaken { waits: bool },
     /// A component on another channel has the id of a gimbal of ours.
     DeviceElsewhere { device: MavId, managed_on: LinkIndex, other_on: LinkIndex },
+    /// Two on one line have the id of a gimbal of ours.
+    DeviceTwice { device: MavId },
     /// The gimbal of an entry was heard on another link than the entry names.
     DeviceOffItsLink { device: MavId, other_on: LinkIndex },
     /// The gimbal of an entry that names its component has another component id now.
@@ -143,6 +145,10 @@ impl Conflict {
                  its frames back.",
                 name(*managed_on),
                 name(*other_on)
+            ),
+            Self::DeviceTwice { device } => format!(
+                "two gimbals on one line seem to have the id {device}: the time since its start jumps to and fro. Neither \
+                 can be steered. Take one of them off the line, and give it another component id."
             ),
             Self::DeviceOffItsLink { device, other_on } => format!(
                 "{device} is heard on link {}, but the gimbal of that id has a [[gimbal]] entry that names another link. If \

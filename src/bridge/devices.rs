@@ -124,6 +124,15 @@ impl Bridge {
         }
     }
 
+    /// Whether two gimbals on one line have the same id.
+    pub(super) fn look_for_twins(&mut self, now: Timestamp) {
+        for gimbal in self.roster.iter().filter(|gimbal| gimbal.manager.seems_to_be_two(now)) {
+            if let Some(device) = gimbal.manager.device() {
+                self.conflicts.note(now, Conflict::DeviceTwice { device });
+            }
+        }
+    }
+
     /// Whether gimbals and autopilot agree where the nose points.
     pub(super) fn compare_headings(&mut self, now: Timestamp) {
         for gimbal in self.roster.iter() {

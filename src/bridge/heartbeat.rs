@@ -32,6 +32,7 @@ impl Bridge {
         if self.identity.has_several(now) && self.settings.system_id == SystemId::Auto {
             self.conflicts.note(now, Conflict::SeveralAutopilots);
         }
+        self.look_for_twins(now);
         self.compare_headings(now);
         self.look_for_renamed(now);
         self.remind_devices(now);

@@ -27,7 +27,9 @@ impl GimbalManager {
                 // What it was told to stop it may not have heard. One that is known to start again is told by its driver.
                 self.forget_demand(now, self.readiness.is_ready() && self.may_be_turning());
                 self.heading_bias = HeadingBias::default();
-                if self.readiness.handle_restarted() {
+                self.restarts.handle_restarted(now);
+                // Two that seem to be one are told of as a conflict.
+                if self.readiness.handle_restarted() && !self.seems_to_be_two(now) {
                     self.tell(Event::Restarted { device: self.device });
                 }
             }

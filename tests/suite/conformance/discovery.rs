@@ -393,6 +393,39 @@ fn item_35_another_clock_in_283_is_no_restart() {
     }
 }
 
+/// "duplicate ids, each with what to do about it": also of two on one line, which are told of once, and not as a restart with
+/// every message.
+#[test]
+fn two_devices_of_one_id_on_one_line_are_named() {
+    let (mut world, places) = with_device();
+    let status = |millis| {
+        let status = device_status(Timestamp::from_millis(millis), 44, 0.0, 0.0);
+        MavMessage::GIMBAL_DEVICE_ATTITUDE_STATUS(status)
+    };
+    let every = Duration::from_millis(200);
+    let both = [(every, places.gimbal, GIMBAL, status(90_000)), (every, places.gimbal, GIMBAL, status(30_000))];
+    world.run_with(Duration::from_secs(20), &both);
+
+    let snapshot = world.snapshot();
+    assert_eq!(
+        snapshot.conflicts,
+        [
+            "two gimbals on one line seem to have the id 1/154: the time since its start jumps to and fro. Neither can be \
+             steered. Take one of them off the line, and give it another component id."
+        ]
+    );
+    let restarts = snapshot.events.iter().filter(|event| event.what == "gimbal_restarted").count();
+    assert_eq!(restarts, 3, "until that was noticed");
+
+    // A gimbal that starts again now and then is one.
+    let (mut world, places) = with_device();
+    for millis in [9_000, 2_000, 9_000, 1_000, 9_000, 500, 9_000, 100] {
+        world.send(places.gimbal, GIMBAL, &status(millis));
+        world.run_for(SECOND);
+    }
+    assert_eq!(world.snapshot().conflicts, Vec::<String>::new());
+}
+
 /// "When failure_flags has 256 (calibration), command 1000 is answered TEMPORARILY_REJECTED and CONFIGURE still
 /// ACCEPTED."
 #[test]
