@@ -64,6 +64,8 @@ pub struct Link {
     pub rx_bytes_understood: u64,
     /// The frames until that look.
     pub rx_frames_seen: u64,
+    /// Since when it is up, while nothing was ever understood on it.
+    pub silent_since: Option<Timestamp>,
     pub tx_frames: u64,
     pub tx_bytes: u64,
     /// Of channels that are closed; those of open streams are added when shown.
@@ -81,6 +83,7 @@ impl Link {
             rx_bytes: 0,
             rx_bytes_understood: 0,
             rx_frames_seen: 0,
+            silent_since: None,
             tx_frames: 0,
             tx_bytes: 0,
             wire: WireCounters::default(),

@@ -49,6 +49,8 @@ pub enum Conflict {
     ForeignSystem { device: MavId, system: u8, is_managed: bool },
     /// On a serial link bytes come, and no frame.
     NotMavlink { link: LinkIndex, baud: u32 },
+    /// On a serial link to a gimbal that is missed nothing ever came.
+    SilentLine { link: LinkIndex, baud: u32 },
     /// A gimbal takes the vehicle's heading for another than the autopilot does, by so much to the right.
     HeadingsApart { device: MavId, degrees: i16 },
     /// No manager component id is left.
@@ -161,6 +163,11 @@ impl Conflict {
                  it out.",
                 name(*link)
             ),
+            Self::SilentLine { link, baud } => format!(
+                "nothing ever came on link {}. Is the gimbal switched on and its wiring right (a Gremsy's is COM2, or COM4), and \
+                 is {baud} its baud rate? With gimbald stopped, 'gimbald scan' finds it out.",
+                name(*link)
+            ),
             Self::DeviceRenamed { former, device } => format!(
                 "gimbal {former} speaks as {device} now, but its [[gimbal]] entry has component_id = {}. Correct the \
                  one or the other.",
@@ -255,6 +262,11 @@ impl Conflicts {
             tracing::warn!(conflict = conflict.describe(&self.links), "conflict");
             self.noticed.push((conflict, now));
         }
+    }
+
+    /// It is not so any more.
+    pub fn end(&mut self, conflict: Conflict) {
+        self.noticed.retain(|(known, _)| *known != conflict);
     }
 
     /// A gimbal with that component id has taken the vehicle's system id.

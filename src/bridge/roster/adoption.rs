@@ -82,7 +82,7 @@ impl Gimbal {
     }
 
     /// Whether its device may be on that link.
-    fn may_be_on(&self, link: LinkIndex) -> bool {
+    pub(in crate::bridge) fn may_be_on(&self, link: LinkIndex) -> bool {
         self.manager.settings().link.is_none_or(|wanted| wanted == link)
     }
 

@@ -323,6 +323,32 @@ fn a44_the_gimbal_hears_of_no_manager_but_ours() {
     assert_eq!(world.take(places.gimbal), []);
 }
 
+/// "If nothing in 10 s, log 'no gimbal heartbeat: check COM2 wiring, baud …'" (gimbals 1.10): a gimbal that waits for a heartbeat is
+/// silent at a wrong baud rate. It is over with the first that is heard, and no other line is meant.
+#[test]
+fn a_serial_line_to_a_gimbal_on_which_nothing_ever_comes_is_named() {
+    let named = "nothing ever came on link serial. Is the gimbal switched on and its wiring right (a Gremsy's is COM2, or COM4), \
+                 and is 57600 its baud rate? With gimbald stopped, 'gimbald scan' finds it out.";
+    for (role, configured, named) in
+        [(Role::Gimbal, false, Some(named)), (Role::Gimbal, true, Some(named)), (Role::Peer, true, None)]
+    {
+        let links = vec![link("serial", role, Transport::Serial { baud: 57_600 })];
+        let entry = GimbalSettings::found("camera".to_owned());
+        let gimbals = Vec::from_iter(configured.then_some(entry));
+        let system_id = SystemId::Fixed(1);
+        let (mut world, places) = World::new(Settings { links, gimbals, system_id, ..Settings::default() });
+        world.run_for(9 * SECOND);
+        assert_eq!(world.snapshot().conflicts, [""; 0], "{role:?}");
+        world.run_for(30 * SECOND);
+        assert_eq!(world.snapshot().conflicts, Vec::from_iter(named), "{role:?} {configured}");
+        world.send(places[0], GIMBAL, &gimbal_heartbeat());
+        world.run_for(2 * SECOND);
+        assert_eq!(world.snapshot().conflicts, [""; 0], "{role:?} {configured}");
+        world.run_for(60 * SECOND);
+        assert_eq!(world.snapshot().conflicts, [""; 0], "{role:?}: it was heard once");
+    }
+}
+
 /// A wrong baud rate looks like this: bytes come, and no frame. It is over when frames come.
 #[test]
 fn a_serial_line_without_mavlink_is_named() {
