@@ -309,7 +309,9 @@ fn explain(reason: &str) -> String {
         "looks_like_a_place" => "its angles look like a place, which MOUNT_CONFIGURE or DO_MOUNT_CONFIGURE in mode 4 makes of them",
         "place_in_the_first_parameters" => "it has the place in parameters 1 to 3, as of old; it belongs into 4 to 6",
         "v1_radio_control_is_none" => NO_RADIO_CONTROL,
-        "no_rc_inputs" | "mount_mode_rc_targeting_unsupported" => "the gimbal has no radio control of its own",
+        "no_rc_inputs" | "mount_mode_rc_targeting_unsupported" => {
+            "the gimbal tells of no radio control of its own; a Gremsy may be left to it by name (radio-control)"
+        }
         "mount_mode_sysid_target_unsupported" => {
             "a mount follows no other vehicle; DO_SET_ROI_LOCATION (195) with its position, again and again, does"
         }

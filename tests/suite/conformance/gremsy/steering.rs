@@ -13,7 +13,9 @@ use gimbald::wire::dialect::{
 use gimbald::wire::ids::{CommandResult, GimbalFlags};
 
 use super::*;
-use crate::support::script::{ACCEPTED, DENIED, NAN, TEMPORARILY_REJECTED, quaternion, set_attitude, set_pitchyaw};
+use crate::support::script::{
+    ACCEPTED, DENIED, NAN, TEMPORARILY_REJECTED, UNSUPPORTED, quaternion, set_attitude, set_pitchyaw,
+};
 use crate::support::world::GIMBAL;
 
 fn bytes(text: &str) -> Vec<u8> {
@@ -448,13 +450,18 @@ fn a_gimbal_that_was_handed_to_its_radio_control_is_told_nothing() {
     assert!(is_handed_over(&world), "{:?}", seen(&world).flags);
 }
 
-/// "DENIED, as its 283 tells of no RC inputs; by name (`radio-control`) 204 with mode 3 …; when it has acknowledged that, the flag is
+/// "DENIED (204 and 205 with mode 3: UNSUPPORTED), as its 283 tells of no RC inputs; by name (`radio-control`) 204 with mode 3 …; when it has acknowledged that, the flag is
 /// in 281, as 285 is its own" (`docs/families/gremsy.md`).
 #[test]
 fn a_gimbal_of_v2_is_handed_to_its_radio_control_by_name_only() {
     let (mut world, places) = running(Generation::V2);
     let given = command_long(MANAGER, 1000, &[0.0, 0.0, NAN, NAN, 256.0, 0.0, 0.0]);
     assert_eq!(world.result_of(places.ground, GCS, &given), Some(DENIED));
+    let by_mount = command_long(MANAGER, command::DO_MOUNT_CONFIGURE, &[3.0]);
+    assert_eq!(world.result_of(places.ground, GCS, &by_mount), Some(UNSUPPORTED));
+    let why = "255/190 was refused: the gimbal tells of no radio control of its own; a Gremsy may be left to it by name \
+               (radio-control)";
+    assert!(world.snapshot().events.iter().any(|event| event.text == why), "{:?}", world.snapshot().events);
     run(&mut world, places, SECOND);
     assert_eq!(orders(&mut world, places), (vec![], vec![]));
 
