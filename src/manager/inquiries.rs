@@ -15,7 +15,7 @@ use crate::wire::ids::message;
 const TO_EVERYBODY: f32 = 2.0;
 
 impl GimbalManager {
-    /// 280 before the gimbal is known is refused for now; nobody needs to be remembered, because every channel is told
+    /// 280 before the gimbal is known is TEMPORARILY_REJECTED; nobody needs to be remembered, because every channel is told
     /// as soon as it is known.
     pub(super) fn request_message(
         &mut self,

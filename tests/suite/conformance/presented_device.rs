@@ -128,7 +128,7 @@ fn without_the_setting_no_device_is_presented() {
 }
 
 /// "Answers to REQUEST_MESSAGE 283 to 1/154 (and 0/0)", as often as it is asked; "283 with true capabilities": the gimbal's
-/// names and limits, and what we add. Before the gimbal is known it is refused for now.
+/// names and limits, and what we add. Before the gimbal is known it is TEMPORARILY_REJECTED.
 #[test]
 fn it_tells_what_the_gimbal_is() {
     let (mut world, places) = World::empty(presenting());

@@ -342,7 +342,7 @@ fn item_102_only_the_gimbal_that_is_meant_moves() {
             message.gimbal_device_id = gimbal;
         }
         world.send(places.ground, GCS, &message);
-        assert_eq!(setpoints(&mut world, places).len(), 1, "helper checks that it is for 154");
+        assert_eq!(setpoints(&mut world, places).len(), 1, "each is for 154");
     }
 }
 
