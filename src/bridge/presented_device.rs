@@ -85,7 +85,7 @@ impl PresentedDevice {
         if heading.is_none() && matches!(self.voice.attitude(), Some(GimbalAttitude::InEarthFrame(_))) {
             return None;
         }
-        self.voice.attitude_status(now, is_alive, manager.tracking().is_locked(), heading)
+        self.voice.attitude_status(now, is_alive, manager.tracking().holds_north(), heading)
     }
 
     /// The channels on which 285 is due.

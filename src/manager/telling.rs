@@ -66,9 +66,9 @@ impl GimbalManager {
 
     /// 285 in the name of a gimbal that is no v2 device, once it has told where it looks.
     pub(super) fn device_attitude_status(&self, now: Timestamp, around: Surroundings<'_>) -> Option<Box<MavMessage>> {
-        let (is_alive, is_held) = (self.state == DeviceState::Alive, self.tracking.is_locked());
+        let (is_alive, held) = (self.state == DeviceState::Alive, self.tracking.holds_north());
         let heading = around.vehicle.heading(now);
-        self.voice.as_ref()?.attitude_status(now, is_alive, is_held, heading).map(Box::new)
+        self.voice.as_ref()?.attitude_status(now, is_alive, held, heading).map(Box::new)
     }
 
     /// 281, once there is a gimbal whose device id is known: what it speaks decides on it.

@@ -323,6 +323,12 @@ impl Tracking {
         self.aim.is_locked()
     }
 
+    /// The same of what is demanded; `None` where nothing is, or the gimbal is left to its radio control.
+    pub fn holds_north(&self) -> Option<bool> {
+        let is_demanded = self.aim != Aim::Idle && !self.is_handed_over();
+        is_demanded.then(|| self.is_locked())
+    }
+
     pub fn roi(&self) -> Option<Position> {
         self.aim.place()
     }

@@ -82,13 +82,13 @@ impl DeviceVoice {
     }
 
     /// 285: exactly one frame bit, and `delta_yaw` a number exactly when `heading` is known. `None` before the gimbal
-    /// has told an attitude. A gimbal that is lost stays where it was last seen, with `COMMS_ERROR`. Yaw is locked where the
-    /// gimbal has a mode for that and is in it, and where it is held to North by what the gimbal is told (`is_held`).
+    /// has told an attitude. A gimbal that is lost stays where it was last seen, with `COMMS_ERROR`. Yaw is locked
+    /// as it is demanded (`held` to North or not), or, where nobody demands anything, as the gimbal's own mode has it.
     pub fn attitude_status(
         &self,
         now: Timestamp,
         is_alive: bool,
-        is_held: bool,
+        held: Option<bool>,
         heading: Option<Angle>,
     ) -> Option<MavMessage> {
         let status = self.latest?;
@@ -110,7 +110,7 @@ impl DeviceVoice {
             | GimbalFlags::RC_EXCLUSIVE
             | GimbalFlags::RC_MIXED;
         let mut flags = status.flags.intersection(kept) | frame;
-        flags.set(GimbalFlags::YAW_LOCK, is_held || status.flags.contains(GimbalFlags::YAW_LOCK));
+        flags.set(GimbalFlags::YAW_LOCK, held.unwrap_or(status.flags.contains(GimbalFlags::YAW_LOCK)));
         // A client may ask for yaw from North whenever we can turn it into what the gimbal takes.
         flags.set(GimbalFlags::ACCEPTS_YAW_IN_EARTH_FRAME, heading.is_some());
         let mut failures = status.failures;

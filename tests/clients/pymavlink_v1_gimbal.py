@@ -103,6 +103,8 @@ class V1Gimbal:
         self.vehicle = None
         self.is_broken = None
         self._heard_vehicle_at = None
+        # How often it has said that it is ready.
+        self.said_ready = 0
         self._pitch, self._yaw = Axis(), Axis()
         self._mode, self._configured = None, None
         self._attitudes = []
@@ -172,6 +174,7 @@ class V1Gimbal:
         # "ACTIVE only when ready for angle targets."
         ready = now - self._heard_vehicle_at > 1.0
         state = mavlink.MAV_STATE_ACTIVE if ready else mavlink.MAV_STATE_BOOT
+        self.said_ready += ready
         self._mav.heartbeat_send(mavlink.MAV_TYPE_GIMBAL, mavlink.MAV_AUTOPILOT_GENERIC, 0, 0, state)
 
     def _report(self, now):
@@ -357,6 +360,9 @@ class Flight:
             expect(information.gimbal_device_id == 1, f"device {information.gimbal_device_id}")
             wait_for("an attitude", lambda: client.last("GIMBAL_DEVICE_ATTITUDE_STATUS"), 3)
             wait_for("a heading at the gimbal", lambda: gimbal.heading() is not None, 5)
+            # Before it has heard that, the daemon refuses for the time being, and two of them may get lost.
+            wait_for("the gimbal's word that it is ready", lambda: gimbal.said_ready >= 3, 8)
+            time.sleep(BadLine.JITTER)
             pose = gimbal.pose()
             expect(pose == (0.0, 0.0, None), f"it was moved before anybody asked: {pose}")
 

@@ -286,6 +286,14 @@ fn v1_its_285_tells_the_mode_that_it_is_in() {
         assert_eq!(operate(&mut world, places, operation), Some(Ok(())), "{named}");
         assert_eq!(told_flags(&mut world, places), [flags], "{named}");
     }
+    // What somebody demands shows at once: ground stations take their lock button from it.
+    for (demanded, flags) in [(28.0, 0xbc), (12.0, 0xac), (28.0, 0xbc), (12.0, 0xac)] {
+        take_control(&mut world);
+        let id = world.ask_by_name("camera", &Asked::ReleaseControl);
+        assert!(world.answers.contains(&(id, Ok(()))));
+        demand(&mut world, places, [-10.0, 20.0, NAN, NAN, demanded]);
+        assert_eq!(told_flags(&mut world, places), [flags], "{demanded}");
+    }
 }
 
 /// "flags 0x0C plus YAW_LOCK/frame bits"; firmware before 7.8.7 knows no frame bits and gets none (gimbals 1.5, 1.7).
