@@ -179,24 +179,36 @@ fn refusals_have_their_exit_codes() {
     assert_eq!(rejected["only_for_the_holder"], 1, "{rejected:?}");
 }
 
-/// "Dangerous ones need the word typed": which gimbal cuts its motors to retract the daemon alone knows; what is to be typed
-/// is said in the words of the command line.
-#[test]
-fn a_retract_that_cuts_the_motors_is_told_what_to_type() {
+/// A folder with a token, and who answers so, one body to each client.
+fn daemon_that_answers(
+    status: &'static str,
+    bodies: &'static [&'static str],
+) -> (tempfile::TempDir, String, thread::JoinHandle<()>) {
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(folder.path().join("token"), TOKEN).expect("a writable folder");
     fs::set_permissions(folder.path().join("token"), fs::Permissions::from_mode(0o600)).expect("our own file");
     let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
     let url = format!("http://{}", listener.local_addr().expect("a port"));
     let answers = thread::spawn(move || {
-        for body in [r#"{"error": "this is dangerous", "reason": "unconfirmed"}"#, r#"{"error": "this is wrong"}"#] {
+        for body in bodies {
             let (mut stream, _) = listener.accept().expect("a client");
             let length = stream.read(&mut [0; 4096]).expect("a request");
             assert!(length > 0);
-            let answer = format!("HTTP/1.1 422 Unprocessable Entity\r\ncontent-length: {}\r\n\r\n{body}", body.len());
+            let answer = format!("HTTP/1.1 {status}\r\ncontent-length: {}\r\n\r\n{body}", body.len());
             stream.write_all(answer.as_bytes()).expect("it listens");
         }
     });
+    (folder, url, answers)
+}
+
+/// "Dangerous ones need the word typed": which gimbal cuts its motors to retract the daemon alone knows; what is to be typed
+/// is said in the words of the command line.
+#[test]
+fn a_retract_that_cuts_the_motors_is_told_what_to_type() {
+    let (folder, url, answers) = daemon_that_answers(
+        "422 Unprocessable Entity",
+        &[r#"{"error": "this is dangerous", "reason": "unconfirmed"}"#, r#"{"error": "this is wrong"}"#],
+    );
     for expected in [
         "gimbald: 'motors off' can cost the camera or the flight: with retract_allowed a Gremsy's motors are switched off; \
          the camera falls to where its weight takes it, and some firmware switches the motors on again only after a \
@@ -214,20 +226,7 @@ fn a_retract_that_cuts_the_motors_is_told_what_to_type() {
 /// What has no daemon's answer was not done by one.
 #[test]
 fn what_is_no_gimbald_has_done_nothing() {
-    let folder = tempfile::tempdir().expect("a folder");
-    fs::write(folder.path().join("token"), TOKEN).expect("a writable folder");
-    fs::set_permissions(folder.path().join("token"), fs::Permissions::from_mode(0o600)).expect("our own file");
-    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
-    let url = format!("http://{}", listener.local_addr().expect("a port"));
-    let answers = thread::spawn(move || {
-        for body in ["", "done", "{\"gimbal\": \"camera\"}"] {
-            let (mut stream, _) = listener.accept().expect("a client");
-            let length = stream.read(&mut [0; 4096]).expect("a request");
-            assert!(length > 0);
-            let answer = format!("HTTP/1.1 200 OK\r\ncontent-length: {}\r\n\r\n{body}", body.len());
-            stream.write_all(answer.as_bytes()).expect("it listens");
-        }
-    });
+    let (folder, url, answers) = daemon_that_answers("200 OK", &["", "done", "{\"gimbal\": \"camera\"}"]);
     for why in ["EOF while parsing", "expected value", "missing field `done`"] {
         let arguments = ["gimbal", "camera", "stop", "--token-file", "token", "--url", &url];
         let outcome = gimbald(folder.path(), &arguments, &[]);
